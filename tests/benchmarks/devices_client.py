@@ -49,6 +49,9 @@ class _Counting:
     def state_changed(self, state: UnitState, reason: str, now: float) -> None:
         pass
 
+    def connection_renewed(self, now: float) -> None:
+        pass
+
     def identified(self, identity: UnitIdentity, former: UnitIdentity | None, now: float) -> None:
         pass
 

@@ -9,6 +9,8 @@
 | the robot is stale, `on_stale: hold` | nothing new; what is repeated goes on |
 | the robot is stale, `on_stale: exception` | nothing, and nothing is repeated |
 | `every` has passed since the last write | the value again, once there was a first write |
+| the connection broke, and is there again before the device was lost | as if it came, with `on_connect: write` |
+| the device is there, and has not answered a write | the value again, every RETRY_AFTER |
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.links.devices.plan import Sending
 
+RETRY_AFTER: Final = 1.0
+"""Seconds after which a value is given again that the device has not answered, or that may be lost in it."""
 _UNKNOWN: Final = (Quality.NEVER, Quality.STALE, Quality.UNAVAILABLE)
 """Qualities of a value that the robot does not report now."""
 
@@ -39,6 +43,7 @@ class Outflow:
         """What the device is taken to have of each output; without one, nothing was written since it came."""
         self._again: dict[int, float] = {}
         """When an output is to be written again."""
+        self._renewed_at = -math.inf
 
     def rebind(self, cell: Cell, sendings: Sequence[Sending], variables: Mapping[int, int]) -> None:
         """Go on in the successor of the cell; `variables`: its indices there by those here."""
@@ -51,6 +56,25 @@ class Outflow:
         if not self._there:
             self._there = True
             self.update(now)
+
+    def renew(self, now: float) -> None:
+        """The connection is another one: what a device has that may have begun anew is not known any more.
+
+        Not that of one that closes each connection, and not what waits for a change: that would not be written now.
+        """
+        if now - self._renewed_at < RETRY_AFTER:
+            return
+        self._renewed_at = now
+        for sending in self._sendings:
+            if sending.brings_up_to_date:
+                self._known.pop(sending.variable, None)
+                self._again.pop(sending.variable, None)
+        self.update(now)
+
+    def unanswered(self, variable: int, now: float) -> None:
+        """A value was not taken, though the device has not refused it: it would never get it unless it changed."""
+        if variable in self._known:
+            self._again[variable] = min(self._again.get(variable, math.inf), now + RETRY_AFTER)
 
     def lose(self) -> None:
         """The device is gone: what it has is not known any more."""
@@ -83,6 +107,7 @@ class Outflow:
                 if index in self._cell.image.unreadable:
                     self._again[index] = now
                 else:
+                    del self._again[index]
                     self._give(sending, self._known[index], now)
 
     def _is_reported(self, index: int) -> bool:

@@ -14,6 +14,8 @@ from gatewayd.mapping.typed import BeforeValidator, Field
 
 DEVICE_SELECTORS: Final = ("modbus", "serial", "canopen")
 """Keys of a device of which exactly one says what it is; those of all families."""
+MAX_UNIT_OF_LINE: Final = 247
+"""Greatest address on a serial line (Modbus over Serial Line V1.02, 2.2); 0 is a broadcast."""
 PLACE_SELECTORS: Final = ("coil", "discrete", "input", "holding", "object")
 """Keys of a place of which exactly one says where it is; those of all families."""
 
@@ -51,6 +53,13 @@ class DeviceSpec(DeviceKeys, ModbusDeviceKeys, CanopenDeviceKeys):
             found = "none" if not given else " and ".join(given)
             message = f"a device has exactly one of {', '.join(DEVICE_SELECTORS)}; found {found}"
             refuse(syntax.MISSING_KEY, message, "write for example {modbus: 192.168.1.30:502, unit: 1}")
+        is_rtu = self.serial is not None or self.framing == "rtu"
+        if is_rtu and not 1 <= self.unit <= MAX_UNIT_OF_LINE:
+            refuse(
+                syntax.OUT_OF_RANGE,
+                f"a unit on a serial line is between 1 and {MAX_UNIT_OF_LINE}, not {self.unit}",
+                "write the address that is set at the device; 0 is all of them at once, and nobody answers",
+            )
         if self.canopen is not None and self.node is None:
             message = "a CANopen device has a node-ID"
             refuse(

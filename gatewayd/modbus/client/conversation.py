@@ -19,6 +19,9 @@ from gatewayd.modbus.frames import FramingError
 
 MAX_LATE = 256
 """Requests that were given up and whose late answers are still known for what they are."""
+MAX_UNASKED = 1000
+"""Frames in a row that no request underway has asked for, after which the connection is given up: a device that floods
+it must not keep the loop busy."""
 _BROADCAST = 0
 
 
@@ -67,13 +70,14 @@ class Broken(Exception):
 class TcpConversation:
     """Modbus TCP, up to `most` requests underway (Messaging Guide V1.0b, 4.2.1: up to 16 are usual)."""
 
-    __slots__ = ("_framing", "_late", "_most", "_underway", "is_ambiguous", "jobs")
+    __slots__ = ("_framing", "_late", "_most", "_unasked", "_underway", "is_ambiguous", "jobs")
 
     def __init__(self, most: int = 1, transaction: int = 0) -> None:
         self._most = most
         self._framing = TcpFraming(transaction)
         self._underway: dict[int, Job] = {}
         self._late: OrderedDict[int, Job] = OrderedDict()
+        self._unasked = 0
         self.is_ambiguous = False
         self.jobs: list[Job] = []
 
@@ -102,8 +106,11 @@ class TcpConversation:
         try:
             for frame in self._framing.feed(data):
                 job = self._underway.pop(frame.transaction, None)
+                self._unasked = 0 if job is not None else self._unasked + 1
                 if job is None:
                     self._count_late(frame.transaction)
+                    if self._unasked > MAX_UNASKED:
+                        raise Broken("answers that nobody has asked for", finished, self._culprit())
                 elif frame.unit != job.unit and any(frame.unit == other.unit for other in self.jobs):
                     self._underway[frame.transaction] = job  # more likely it is the transaction that is wrong
                 else:

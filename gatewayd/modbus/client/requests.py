@@ -16,6 +16,7 @@ from gatewayd.modbus.exceptions import NAMES, ExceptionCode
 _ERROR_BIT = 0x80
 _MAX_ADDRESS = 0xFFFF
 _MAX_OBJECT_ID = 0xFF
+_ACKNOWLEDGE = 5
 _NO_PATH = (ExceptionCode.PATH_UNAVAILABLE, ExceptionCode.TARGET_FAILED)
 
 
@@ -75,6 +76,11 @@ class ExceptionAnswer:
     def is_no_answer(self) -> bool:
         """Whether a gateway says that the unit behind it does not answer (0A, 0B)."""
         return self.code in _NO_PATH
+
+    @property
+    def is_refusal(self) -> bool:
+        """Whether the unit will say the same again: it is neither away nor busy."""
+        return self.code not in (*_NO_PATH, _ACKNOWLEDGE, ExceptionCode.BUSY)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ or when nothing came for `lost_after` seconds though something was wanted, whate
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Hashable
+from collections import Counter, deque
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 from functools import partial
 
@@ -42,6 +42,8 @@ _KEEPALIVE = ReadGroup(Area.HOLDING, 0, 1, (GroupMember(0, 0, 1),), (read(Area.H
 Answered = Callable[["bytes | Failure", float], None]
 """Hears what became of a request, and when."""
 
+_REST = 0.5
+"""Time-outs before a place is read again: units that have lost the thread find it in silence."""
 _PATIENCE = 1.25
 """How much longer than the one before a late answer may take."""
 _DOUBTFUL = 5
@@ -102,7 +104,9 @@ class Station:
         self._reader = IdentityReader(settings.is_identified, settings.serial)
         self._is_identifying = False
         self._asked: deque[tuple[ModbusRequest, Answered]] = deque()
-        self._hold_until = AT_ONCE
+        self._is_renewed = False
+        self._hold_until = self._settled_at = AT_ONCE
+        self._shared_shapes = _shared_shapes(polls)
         self._repeat: tuple[PollCycle, ReadGroup, int] | None = None
         """What is read next, because an answer to it may still come that nothing tells from another's."""
         self._unanswered: deque[float] = deque(maxlen=_MAX_UNANSWERED)
@@ -169,6 +173,7 @@ class Station:
         """The line's connection is there (again): what is behind it may be another device, or one that was away."""
         self._reader.begin()
         self._repeat = None
+        self._is_renewed = self.state is UnitState.ONLINE
         if may_be_back and self.breaker.state is BreakerState.OPEN:
             self.breaker.probe_at = min(self.breaker.probe_at, now)
         self._refresh()
@@ -179,9 +184,8 @@ class Station:
         An answer that comes later must not be taken for that of another place in the unit: the same place is read
         again, whose answer it may be (`_settle`). After a write or a single request it is left alone for a while.
         """
-        if job.read is None:
-            self._hold_until = now + job.timeout
-        else:
+        self._hold_until = now + (job.timeout if job.read is None else _REST * job.timeout)
+        if job.read is not None:
             self._repeat = job.read
             self._unanswered.append(job.sent_at)
         self._refresh()
@@ -198,7 +202,9 @@ class Station:
         """
         since = self._in_doubt_since(now)
         if since < NEVER:
-            self._hold_until = job.sent_at + _PATIENCE * (now - since)
+            self._settled_at = job.sent_at + _PATIENCE * (now - since)
+            if _shape(job.request) in self._shared_shapes:
+                self._hold_until = self._settled_at
         self._repeat = None
         self._unanswered.clear()
 
@@ -232,9 +238,11 @@ class Station:
         if self.in_flight >= self.settings.in_flight:
             self.read_due = NEVER
         elif self._reader.request is not None and self._repeat is None:
-            self.read_due = NEVER if self._is_identifying else hold
-        elif self._asked or self._repeat is not None:
+            self.read_due = NEVER if self._is_identifying else max(hold, self._settled_at)
+        elif self._repeat is not None:
             self.read_due = hold
+        elif self._asked:
+            self.read_due = max(hold, self._settled_at)
         elif len(self._cycles) == 1:
             self.read_due = max(self._cycles[0].due, hold)
         else:
@@ -327,8 +335,12 @@ class Station:
             for cycle in self._cycles:
                 cycle.restart(now)
             self.state, self.reason = UnitState.ONLINE, ""
+            self._is_renewed = False
             self._refresh()
             self.listener.state_changed(self.state, "", now)
+        elif self._is_renewed:
+            self._is_renewed = False
+            self.listener.connection_renewed(now)
 
     def _failed(self, job: Job, failure: Failure, now: float) -> None:
         if isinstance(failure, ConnectionLost) and not job.is_blamed:
@@ -352,6 +364,20 @@ class Station:
         self.listener.state_changed(self.state, reason, now)
         while self._asked:
             self._asked.popleft()[1](ConnectionLost(reason), now)
+
+
+def _shape(request: ModbusRequest) -> tuple[int, int]:
+    """What tells an answer from those to other requests of a unit on a serial line."""
+    return request.function, request.answer_size
+
+
+def _shared_shapes(polls: Iterable[PollClass]) -> frozenset[tuple[int, int]]:
+    """Those of more than one place."""
+    places = {
+        request.pdu: _shape(request) for poll in polls for group in poll.groups for request in group.requests
+    }
+    counts = Counter(places.values())
+    return frozenset(shape for shape, count in counts.items() if count > 1)
 
 
 def _due(cycle: PollCycle) -> float:

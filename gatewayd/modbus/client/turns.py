@@ -95,11 +95,13 @@ class Turns:
         was_closed = station is not None and station.breaker.is_closed
         job.done(job, outcome, now)
         if station is not None and not station.breaker.is_closed:
-            if was_closed:
+            if was_closed or isinstance(
+                outcome, bytes
+            ):  # bytes: it answers, but perhaps to an earlier request
                 self._may_be_back.add(station)
             if job.is_probe:
                 # Bytes that are no answer may have cost others theirs.
-                least = 0.0 if isinstance(outcome, ExceptionAnswer) else job.timeout
+                least = 0.0 if isinstance(outcome, (bytes, ExceptionAnswer)) else job.timeout
                 self._budget.spend(max(now - job.sent_at, least), now)
                 self._failed_probe_at = self._number + 1
         if not was_anybody_there and self.is_anybody_there:

@@ -43,6 +43,9 @@ class StationListener(Protocol):
     def state_changed(self, state: UnitState, reason: str, now: float) -> None:
         """The unit is there, or lost, and the reason in words. Writes that waited are forgotten when it is lost."""
 
+    def connection_renewed(self, now: float) -> None:
+        """It answers on another connection, though it was not lost in between: it may have begun anew all the same."""
+
     def identified(self, identity: UnitIdentity, former: UnitIdentity | None, now: float) -> None:
         """It was identified, whenever it or its connection is back; `former` is None at the first time.
 

@@ -14,16 +14,12 @@ from typing import NamedTuple
 
 from gatewayd.modbus.client.polling import NEVER
 from gatewayd.modbus.client.requests import ExceptionAnswer, Failure, ModbusRequest
-from gatewayd.modbus.exceptions import ExceptionCode
 
 MAX_KEYS = 4096
 MAX_TRIES = 3
 """A write that is not answered as often as this, while the unit answers others, is given up."""
 RETRY_AFTER = 0.1
 """Seconds before a write is tried again that was not answered, or that the unit was too busy for."""
-
-_ACKNOWLEDGE = 5
-_TRY_AGAIN = (_ACKNOWLEDGE, ExceptionCode.BUSY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,9 +105,7 @@ class WriteQueue:
     def failed(self, failure: Failure, now: float) -> bool:
         """The one underway has failed. Whether it is given up; else it is the next, unless a newer one waits."""
         key, order = self._ended()
-        is_refused = isinstance(failure, ExceptionAnswer) and not (
-            failure.is_no_answer or failure.code in _TRY_AGAIN
-        )
+        is_refused = isinstance(failure, ExceptionAnswer) and failure.is_refusal
         self._tries = self._tries + 1 if key == self._failed_key else 1
         self._failed_key = key
         if is_refused or self._is_forgotten or self._tries >= MAX_TRIES:

@@ -104,3 +104,30 @@ def test_a_file_without_devices_is_not_judged_by_their_rules() -> None:
     text = "gatewayd: 1\ncell: press\nrobot: {host: 127.0.0.1}\nvariables:\n"
     plan = planned("  done: {robot: output_bit_register_0}\n", text)
     assert list(plan.links) == ["robot"]
+
+
+@pytest.mark.parametrize("unit, is_right", [(0, False), (1, True), (247, True), (248, False)])
+@pytest.mark.parametrize("line", ["serial: /dev/ttyUSB0, baudrate: 9600", "modbus: 127.0.0.1, framing: rtu"])
+def test_a_unit_of_a_serial_line_has_an_address_that_it_answers_to(
+    line: str, unit: int, is_right: bool
+) -> None:
+    head = HEAD.replace("serial: /dev/ttyUSB0, baudrate: 115200, unit: 9", f"{line}, unit: {unit}")
+    messages = [error.message for error in loaded(head=head).errors if error.rule.id == "GW116"]
+    assert messages == ([] if is_right else [f"a unit on a serial line is between 1 and 247, not {unit}"])
+
+
+def test_a_lease_ends_between_two_polls() -> None:
+    found = loaded(VARIABLES.replace("lease: 5s", "lease: 300ms")).diagnostics
+    (said,) = (each for each in found if each.rule.id == "GW817")
+    assert said.message == (
+        "`speed` is lost after its lease of 300ms, but an answer of `island` may take 520ms with its poll"
+    )
+
+
+def test_a_fallback_that_the_register_of_an_input_does_not_have_is_no_trouble() -> None:
+    """Nobody is shown an input by the device that it comes from."""
+    plan = planned(
+        VARIABLES.replace("type: uint16}, owner: [plc", "type: uint16}, on_release: -1, owner: [plc")
+    )
+    speed = next(variable for variable in plan.cell.variables if variable.name == "speed")
+    assert speed.shown is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.core.definition import Value
-from gatewayd.links.devices.outflow import Outflow
+from gatewayd.links.devices.outflow import RETRY_AFTER, Outflow
 from gatewayd.links.devices.plan import Sending
 from tests.links.devices.cells import NOW, FakeRobot, planned
 
@@ -120,3 +120,42 @@ def test_what_was_written_is_known_in_the_successor() -> None:
     output.outflow.rebind(output.robot.cell, [Sending(1)], {0: 1})
     output.outflow.update(NOW)
     assert output.sent == [7]
+
+
+@pytest.mark.parametrize("write, sent", [(False, []), (True, [7, 7])])
+def test_a_device_on_a_new_connection_may_have_begun_anew(write: bool, sent: list[Value]) -> None:
+    output = Output(write=write)
+    output.robot.fresh(clamp=7)
+    output.outflow.connect(NOW)
+    output.outflow.renew(NOW + 1)
+    output.outflow.renew(NOW + 1.1)  # one that closes each connection is not written with each of them
+    assert output.sent == sent
+
+
+def test_a_device_on_a_new_connection_gets_nothing_before_the_robot_is_fresh_again() -> None:
+    output = Output("hold", write=True, every=1.0)
+    output.robot.fresh(clamp=7)
+    output.outflow.connect(NOW)
+    output.robot.cell.robot_lost("gone", NOW)
+    output.outflow.renew(NOW + 0.5)
+    output.outflow.tick(NOW + 2)
+    assert output.sent == [7]
+    output.robot.fresh(NOW + 3, clamp=8)
+    assert output.sent == [7, 8]
+
+
+def test_a_value_that_is_not_answered_is_given_again_until_it_is() -> None:
+    output = Output()
+    output.robot.fresh(clamp=7)
+    output.outflow.connect(NOW)
+    output.robot.fresh(NOW, clamp=8)
+    output.outflow.unanswered(0, NOW)
+    output.outflow.tick(NOW + 0.9 * RETRY_AFTER)
+    assert output.sent == [8]
+    output.outflow.tick(NOW + RETRY_AFTER)
+    output.outflow.tick(NOW + 2 * RETRY_AFTER)
+    assert output.sent == [8, 8]
+    output.outflow.lose()
+    output.outflow.unanswered(0, NOW)
+    output.outflow.tick(NOW + 5 * RETRY_AFTER)
+    assert output.sent == [8, 8]

@@ -4,7 +4,13 @@ import pytest
 
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.client import pdus
-from gatewayd.modbus.client.conversation import MAX_LATE, Broken, RtuConversation, TcpConversation
+from gatewayd.modbus.client.conversation import (
+    MAX_LATE,
+    MAX_UNASKED,
+    Broken,
+    RtuConversation,
+    TcpConversation,
+)
 from gatewayd.modbus.client.polling import NEVER
 from gatewayd.modbus.client.requests import BadAnswer, Failure, TimedOut, read, write_register
 from gatewayd.modbus.client.station import Job, Station
@@ -192,3 +198,15 @@ def test_rtu_broadcast_has_its_turnaround_and_no_answer() -> None:
     (finished,) = line.expired(10.3)
     assert finished.outcome == b""
     assert line.ready_at() < 10.3
+
+
+def test_connection_flooded_with_answers_that_nobody_asked_for_is_given_up() -> None:
+    tcp = TcpConversation()
+    tcp.begin(job(), 0)
+    few = encode(9, 1, ANSWER) * MAX_UNASKED
+    assert tcp.received(few, 0.1) == []
+    (finished,) = tcp.received(encode(1, 1, ANSWER), 0.1)
+    assert finished.outcome == DATA
+    assert tcp.received(few, 0.2) == []
+    with pytest.raises(Broken, match="nobody has asked for"):
+        tcp.received(encode(9, 1, ANSWER), 0.2)

@@ -269,7 +269,7 @@ def test_late_answer_on_a_serial_line_is_not_taken_for_that_of_another_place(del
     world.run(10.0)
     assert stations[2].state is UnitState.ONLINE
     units[1].delay = 0.002
-    world.run(5.0)
+    world.run(15.0)
     assert stations[1].state is UnitState.ONLINE
     assert {(group.address, data) for group, data in heard[1].values} == {(10, b"\0\x0a"), (20, b"\0\x14")}
 
@@ -284,7 +284,7 @@ def test_answer_that_is_missing_on_a_serial_line_costs_its_unit_no_more_than_som
     heal(units[1])
     for one in heard.values():
         one.values.clear()
-    world.run(3 * TIMEOUT)
+    world.run(4 * TIMEOUT)
     assert {group.address for group, _ in heard[1].values} == {10, 20}
     assert stations[1].counters.losses == 0
 

@@ -310,3 +310,21 @@ def test_requests_from_outside_are_bounded_and_end_with_the_unit() -> None:
     assert len(answers) == MAX_ASKED
     assert all(isinstance(each, TimedOut | ConnectionLost) for each in answers)
     assert not ask()
+
+
+def test_connection_that_was_renewed_without_a_loss_is_reported_once_the_unit_answers_on_it() -> None:
+    """A device that has begun anew in less than `lost_after` has lost its outputs as well."""
+    world, stations, heard, units = make_world({1: StationSettings(1, polls(0.02))})
+    world.run(0.5)
+    assert "renewed" not in heard[1].order
+    world.close("reset")
+    world.run(0.5)
+    assert heard[1].order.count("renewed") == 1
+    silence(units[1])
+    world.run(3.0)
+    assert state_of(stations[1]) is UnitState.LOST
+    world.close("reset")
+    heal(units[1])
+    world.run(3.0)
+    assert state_of(stations[1]) is UnitState.ONLINE
+    assert heard[1].order.count("renewed") == 1

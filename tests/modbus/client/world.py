@@ -48,6 +48,9 @@ class Heard:
         self.states.append((state, reason, now))
         self.order.append(state.value)
 
+    def connection_renewed(self, now: float) -> None:
+        self.order.append("renewed")
+
     def identified(self, identity: UnitIdentity, former: UnitIdentity | None, now: float) -> None:
         self.identities.append((identity, former))
         self.order.append("identified")

@@ -174,6 +174,9 @@ class _Visit:
         if state is UnitState.LOST or self._ends_when_there:
             self._ended.set()
 
+    def connection_renewed(self, now: float) -> None:
+        """See StationListener."""
+
     def identified(self, identity: UnitIdentity, former: UnitIdentity | None, now: float) -> None:
         """See StationListener."""
         self.identity = identity

@@ -29,7 +29,7 @@ from gatewayd.modbus.areas import Area
 from gatewayd.modbus.client.breaker import BreakerSettings
 from gatewayd.modbus.client.grouping import ReadGroup, WantedItem
 from gatewayd.modbus.client.identity import UnitIdentity
-from gatewayd.modbus.client.requests import Failure
+from gatewayd.modbus.client.requests import ExceptionAnswer, Failure
 from gatewayd.modbus.client.station import Station
 from gatewayd.modbus.client.unit import StationSettings, UnitState
 from gatewayd.report.wording import names_and_more
@@ -205,6 +205,8 @@ class ModbusDeviceLink(Link):
             return
         variable = self._orders.variable_of(key)
         name = "" if variable is None else self._cell.definition.variables[variable].name
+        if variable is not None and not (isinstance(failure, ExceptionAnswer) and failure.is_refusal):
+            self._outflow.unanswered(variable, now)
         reason = f"`{name}` was not written: {failure.text}"
         if self._unwritten.get(key) != reason:
             self._unwritten[key] = reason
@@ -227,6 +229,10 @@ class ModbusDeviceLink(Link):
             self._inflow.lose(reason, now)
             self._outflow.lose()
         self._publish(now)
+
+    def connection_renewed(self, now: float) -> None:
+        """It was not lost, but may have begun anew."""
+        self._outflow.renew(now)
 
     def identified(self, identity: UnitIdentity, former: UnitIdentity | None, now: float) -> None:
         """It has said which device it is."""

@@ -97,6 +97,17 @@ def lost_between_two_polls(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnosti
                 message,
                 hint=f"write at least `lost_after: {seconds(2 * needed)}`, or poll faster",
             )
+        for place in places:
+            lock = place.variable.lock
+            lease = cell.locks[lock].lease if place.is_read and lock is not None else None
+            if lease is not None and lease < place.poll + device.spec.timeout:
+                longest = place.poll + device.spec.timeout
+                message = (
+                    f"`{place.variable.part.name}` is lost after its lease of {seconds(lease)}, but an answer of "
+                    f"`{device.name}` may take {seconds(longest)} with its poll"
+                )
+                hint = f"write at least `lease: {seconds(2 * longest)}`, or poll faster"
+                yield rule.at(place.at(), message, hint=hint)
 
 
 @cell_rule("GW818")

@@ -14,7 +14,7 @@ from gatewayd.links.devices.status_words import DeviceState
 from gatewayd.loop import clock
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.client.identity import UnitIdentity
-from gatewayd.modbus.client.requests import ExceptionAnswer, ModbusRequest
+from gatewayd.modbus.client.requests import ExceptionAnswer, Failure, ModbusRequest, TimedOut
 from gatewayd.modbus.client.station import Answered
 from gatewayd.modbus.client.unit import UnitState
 from tests.links.devices.cells import HEAD, VARIABLES, FakeRobot, device, planned
@@ -106,6 +106,21 @@ def test_a_write_that_is_refused_is_seen_until_one_is_taken(bench: Bench) -> Non
     assert "`clamp` was not written: exception 04" in bench.figure("reason")
     bench.link.write_done(key, None, bench.now)
     assert bench.figure("state") == "good"
+
+
+@pytest.mark.parametrize(
+    "failure, again", [(TimedOut(0.3), 1), (ExceptionAnswer(6), 1), (ExceptionAnswer(2), 0)]
+)
+def test_a_write_that_is_lost_is_made_again_and_one_that_is_refused_is_not(
+    bench: Bench, failure: Failure, again: int
+) -> None:
+    bench.there()
+    bench.robot.fresh(bench.now, clamp=True)
+    bench.written.clear()
+    bench.link.write_done((Area.COIL, 0, None), failure, bench.now)
+    bench.link._tick(bench.now + 1.1)
+    assert len(bench.written) == again
+    assert bench.figure("state") == "partial"
 
 
 def test_parts_of_a_register_are_written_on_connect() -> None:
