@@ -9,7 +9,7 @@ from gatewayd.cli.help_text import FittingFormatter
 from gatewayd.cli.lazy import LazyGroup
 
 COMMANDS = {
-    "demo": "Simulator, gateway, a PLC, an I/O island and a CANopen master in one terminal.",
+    "demo": "Simulator, gateway, PLC, I/O island and CANopen master together.",
     "check": "Find every mistake in mapping files, without a robot.",
     "doctor": "Find out why a cell does not work, and what to do.",
     "test": "Carry out the tests of mapping files, in simulated time.",

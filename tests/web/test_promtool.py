@@ -13,7 +13,9 @@ from ruamel.yaml import YAML
 
 from gatewayd.web.metrics import METRICS
 from tests.e2e.plant import Plant
-from tests.e2e.processes import HOST, free_port
+from tests.e2e.plc import PLC
+from tests.e2e.processes import HOST, free_port, wait_for
+from tests.e2e.test_devices import Island
 
 PROMTOOL = shutil.which("promtool")
 DOCS = Path(__file__).parents[2] / "docs"
@@ -21,9 +23,14 @@ ALERTS = DOCS / "alerts.yaml"
 UNIT_TESTS = Path(__file__).parent / "alerts_test.yaml"
 MAPPING = """\
 canopen: {interface: virtual, channel: promtool, bitrate: 500000, node: 16}
+devices:
+  island: {modbus: "ISLAND", watchdog: none, poll: 20ms, identify: true}
 writers:
   plc: {modbus: 127.0.0.2}
+  island: {device: island}
 variables:
+  made:   {robot: input_int_register_0, device: {holding: 0, type: int32}, owner: island}
+  play:   {dashboard: play, modbus: {coil: 40}, owner: plc}
   start:  {robot: input_bit_register_0, modbus: 0.0, canopen: object, owner: plc}
   cycles: {robot: output_int_register_0, modbus: 110, canopen: auto}
 """
@@ -75,11 +82,23 @@ def test_the_configuration_of_the_guide_loads_the_rules(tmp_path: Path) -> None:
 
 @with_promtool
 def test_what_a_gateway_serves_follows_the_conventions(plant: Plant) -> None:
-    """With both buses, so that every metric is there; the linter says nothing at all."""
-    simulator, port = plant.simulator(), free_port()
-    daemon = plant.daemon(plant.mapping(MAPPING, simulator.port), "--status", f"{HOST}:{port}")
+    """With both buses, a device and the dashboard server, so that every metric is there; the linter says nothing."""
+    port, island, dashboard = free_port(), free_port(), free_port()
+    simulator = plant.simulator("--dashboard", str(dashboard))
+    plant.add(Island(plant.directory / "island.log", island))
+    text = MAPPING.replace("ISLAND", f"{HOST}:{island}")
+    mapping = plant.mapping(
+        text, simulator.port, robot_options=f", series: e, dashboard: {{port: {dashboard}}}"
+    )
+    daemon = plant.daemon(mapping, "--status", f"{HOST}:{port}")
     daemon.wait_for_line("status page")
-    with urllib.request.urlopen(f"http://{HOST}:{port}/metrics", timeout=10) as response:
-        text = response.read().decode()
-    assert promtool("check", "metrics", text=text) == ""
-    assert [info.name for info in METRICS if f"\n# TYPE {info.name} " not in f"\n{text}"] == []
+
+    wait_for(lambda: not plant.plc(PLC).write_coils(40, [True]), "a command to be taken, which does not act")
+
+    def missing() -> list[str]:
+        with urllib.request.urlopen(f"http://{HOST}:{port}/metrics", timeout=10) as response:
+            served = response.read().decode()
+        assert promtool("check", "metrics", text=served) == ""
+        return [info.name for info in METRICS if f"\n# TYPE {info.name} " not in f"\n{served}"]
+
+    wait_for(lambda: missing() == [], "every metric")
