@@ -67,6 +67,7 @@ def test_every_package_comes_without_asyncio(robot: SimulatedRobot) -> None:
 async def test_take_gives_what_is_there_without_waiting(connect: Connect) -> None:
     """A stream of one's own, whose `len` says whether something has come."""
     async with connect(outputs=["robot_mode"]) as robot:
+        await robot.newer(PATIENCE)
         stream = robot.stream()
         await robot.newer(PATIENCE)
         await robot.pause()
