@@ -6,7 +6,6 @@ node-ID and heartbeat, SYNC, the bit-rate), the bus begins anew with all of them
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,14 +17,11 @@ from gatewayd.canopen.manager.runtime import Manager
 from gatewayd.core.cell import Cell
 from gatewayd.links.can_frames import packed
 from gatewayd.links.contract import Link, Passage, Prepared, SharedPart, Tap
+from gatewayd.links.devices.at_work import NothingPrepared, Work, WorkGroup, end_all
 from gatewayd.links.devices.canopen.managed import ManagedDevice
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
-from gatewayd.loop.retry import keep_running
 from gatewayd.mapping.plan import Plan
-
-RETRY_PERIOD = 2.0
-"""Seconds after which a manager that failed by a defect is started again."""
 
 log = logging.getLogger("gatewayd.devices")
 
@@ -36,9 +32,11 @@ class _BusAtWork:
 
     manager: Manager
     links: dict[int, ManagedDevice] = field(default_factory=dict)
-    rests: int = 0
-    """Progress while it waits after a defect."""
-    task: asyncio.Task[None] | None = None
+    work: Work = field(init=False)
+
+    def __post_init__(self) -> None:
+        """The manager at work."""
+        self.work = Work(f"CAN manager {self.manager.plan.channel}", self.manager.run)
 
 
 class CanopenBuses(SharedPart):
@@ -46,24 +44,17 @@ class CanopenBuses(SharedPart):
 
     def __init__(self) -> None:
         self.buses: dict[ManagerPlan, _BusAtWork] = {}
-        self._group: asyncio.TaskGroup | None = None
+        self._group = WorkGroup()
         self._tap: Tap | None = None
 
     async def run(self) -> None:
         """Keep all managers at work until cancelled."""
-        async with asyncio.TaskGroup() as group:
-            self._group = group
-            try:
-                for bus in self.buses.values():
-                    self._begin(bus)
-                await asyncio.get_running_loop().create_future()
-            finally:
-                self._group = None
+        await self._group.run(lambda: [bus.work for bus in self.buses.values()])
 
     def progress(self) -> Mapping[str, int]:
         """Of each manager, whatever its bus does."""
         return {
-            f"CAN manager {plan.channel}": bus.manager.progress + bus.rests
+            f"CAN manager {plan.channel}": bus.manager.progress + bus.work.rests
             for plan, bus in self.buses.items()
         }
 
@@ -88,7 +79,7 @@ class CanopenBuses(SharedPart):
 
     async def prepare(self, plans: Sequence[Plan]) -> Prepared:
         """Nothing: a bus that cannot be used keeps no mapping from being served."""
-        return _NothingPrepared()
+        return NothingPrepared()
 
     def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
         """Have a manager for every bus of these devices, and no other; each with its devices and no others."""
@@ -101,24 +92,24 @@ class CanopenBuses(SharedPart):
                 if link not in wanted.get(plan, ()):
                     self._detach(bus, number)
             if plan not in wanted:
-                self._end(bus)
+                self._detach_all(bus)
+                bus.work.end()
                 del self.buses[plan]
         for plan, devices in wanted.items():
             if plan not in self.buses:
                 self.buses[plan] = self._bus(plan)
-                self._begin(self.buses[plan])
+                self._group.begin(self.buses[plan].work)
             for link in devices:
                 if link not in self.buses[plan].links.values():
                     self._attach(self.buses[plan], link)
 
     async def close(self) -> None:
         """Manage nothing any more; the devices are left as they are, and miss the manager's heartbeat."""
-        tasks = [bus.task for bus in self.buses.values() if bus.task is not None]
-        for bus in self.buses.values():
-            self._end(bus)
+        buses = list(self.buses.values())
         self.buses.clear()
-        if tasks:
-            await asyncio.wait(tasks)
+        for bus in buses:
+            self._detach_all(bus)
+        await end_all(bus.work for bus in buses)
 
     def _bus(self, plan: ManagerPlan) -> _BusAtWork:
         def report(text: str) -> None:
@@ -140,22 +131,9 @@ class CanopenBuses(SharedPart):
 
         manager.tap = passing if tap is not None else None
 
-    def _begin(self, bus: _BusAtWork) -> None:
-        if self._group is None or bus.task is not None:
-            return
-
-        def progress() -> None:
-            bus.rests += 1
-
-        work = keep_running(bus.manager.run, log, RETRY_PERIOD, progress)
-        bus.task = self._group.create_task(work, name=f"CAN manager {bus.manager.plan.channel}")
-
-    def _end(self, bus: _BusAtWork) -> None:
+    def _detach_all(self, bus: _BusAtWork) -> None:
         for number in list(bus.links):
             self._detach(bus, number)
-        if bus.task is not None:
-            bus.task.cancel()
-            bus.task = None
 
     @staticmethod
     def _attach(bus: _BusAtWork, link: ManagedDevice) -> None:
@@ -174,13 +152,3 @@ class CanopenBuses(SharedPart):
         link = bus.links.pop(number)
         bus.manager.detach(number, "the device is not declared any more")
         link.node = link.manager = None
-
-
-class _NothingPrepared:
-    """There is nothing to take back."""
-
-    def commit(self) -> None:
-        """See Prepared."""
-
-    async def abort(self) -> None:
-        """See Prepared."""

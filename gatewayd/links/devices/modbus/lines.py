@@ -6,7 +6,6 @@ same time, a connection for each request), the line begins anew with all of them
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,17 +13,14 @@ from typing import Protocol, cast
 
 from gatewayd.core.cell import Cell
 from gatewayd.links.contract import Link, Prepared, SharedPart, Tap
+from gatewayd.links.devices.at_work import NothingPrepared, Work, WorkGroup, end_all
 from gatewayd.links.devices.modbus.plan import LineAddress, ModbusDevicePlan
 from gatewayd.links.devices.modbus.tapped import TappedRunner, TappedTcpLine
 from gatewayd.logs.records import fields
-from gatewayd.loop.retry import keep_running
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.client.line import ConnectionUse, Line, LineSettings
 from gatewayd.modbus.client.station import Station
 from gatewayd.modbus.client.tcp import TcpAddress, TcpFrames
-
-RETRY_PERIOD = 2.0
-"""Seconds after which a line that failed by a defect is started again."""
 
 log = logging.getLogger("gatewayd.devices")
 
@@ -50,9 +46,11 @@ class _LineAtWork:
 
     address: LineAddress
     runner: TappedRunner
-    rests: int = 0
-    """Progress while it waits after a defect."""
-    task: asyncio.Task[None] | None = field(default=None)
+    work: Work = field(init=False)
+
+    def __post_init__(self) -> None:
+        """The connection at work."""
+        self.work = Work(f"line {self.address.text}", self.runner.run)
 
     @property
     def stations(self) -> list[Station]:
@@ -65,24 +63,18 @@ class ModbusLines(SharedPart):
 
     def __init__(self) -> None:
         self.lines: dict[LineAddress, _LineAtWork] = {}
-        self._group: asyncio.TaskGroup | None = None
+        self._group = WorkGroup()
         self._tap: Tap | None = None
 
     async def run(self) -> None:
         """Keep all lines at work until cancelled."""
-        async with asyncio.TaskGroup() as group:
-            self._group = group
-            try:
-                for line in self.lines.values():
-                    self._begin(line)
-                await asyncio.get_running_loop().create_future()
-            finally:
-                self._group = None
+        await self._group.run(lambda: [line.work for line in self.lines.values()])
 
     def progress(self) -> Mapping[str, int]:
         """Of each line, whatever its devices do."""
         return {
-            f"line {address.text}": line.runner.progress + line.rests for address, line in self.lines.items()
+            f"line {address.text}": line.runner.progress + line.work.rests
+            for address, line in self.lines.items()
         }
 
     def gap(self, since: float, now: float) -> None:
@@ -98,7 +90,7 @@ class ModbusLines(SharedPart):
 
     async def prepare(self, plans: Sequence[Plan]) -> Prepared:
         """Nothing: a device that cannot be reached keeps no mapping from being served."""
-        return _NothingPrepared()
+        return NothingPrepared()
 
     def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
         """Have a line for every address of these devices, and no other; each with its devices and no others."""
@@ -108,24 +100,24 @@ class ModbusLines(SharedPart):
             wanted.setdefault(device.plan.line, []).append(device)
         for address, line in list(self.lines.items()):
             if address not in wanted or line.runner.line.settings != settings_of(wanted[address]):
-                self._end(line)
+                self._remove_all(line)
+                line.work.end()
                 del self.lines[address]
         for address, devices in wanted.items():
             if address not in self.lines:
                 self.lines[address] = line = self._line(address, settings_of(devices))
-                self._begin(line)
+                self._group.begin(line.work)
                 for device in devices:
                     device.begin_anew()
             self._put(self.lines[address], [device.station for device in devices])
 
     async def close(self) -> None:
         """Ask nobody any more."""
-        tasks = [line.task for line in self.lines.values() if line.task is not None]
-        for line in self.lines.values():
-            self._end(line)
+        lines = list(self.lines.values())
         self.lines.clear()
-        if tasks:
-            await asyncio.wait(tasks)
+        for line in lines:
+            self._remove_all(line)
+        await end_all(line.work for line in lines)
 
     def _line(self, address: LineAddress, settings: LineSettings) -> _LineAtWork:
         def report(reason: str) -> None:
@@ -138,23 +130,10 @@ class ModbusLines(SharedPart):
         runner.tap, runner.peer = self._tap, address.text
         return _LineAtWork(address, runner)
 
-    def _begin(self, line: _LineAtWork) -> None:
-        if self._group is None or line.task is not None:
-            return
-
-        def progress() -> None:
-            line.rests += 1
-
-        work = keep_running(line.runner.run, log, RETRY_PERIOD, progress)
-        line.task = self._group.create_task(work, name=f"line {line.address.text}")
-
     @staticmethod
-    def _end(line: _LineAtWork) -> None:
+    def _remove_all(line: _LineAtWork) -> None:
         for station in list(line.stations):
             line.runner.remove(station)
-        if line.task is not None:
-            line.task.cancel()
-            line.task = None
 
     @staticmethod
     def _put(line: _LineAtWork, stations: Sequence[Station]) -> None:
@@ -185,13 +164,3 @@ def settings_of(devices: Sequence[DeviceOnLine]) -> LineSettings:
         in_flight=1 if per_request else max(plan.in_flight for plan in plans),
         use=ConnectionUse.PER_REQUEST if per_request else ConnectionUse.KEPT,
     )
-
-
-class _NothingPrepared:
-    """There is nothing to take back."""
-
-    def commit(self) -> None:
-        """See Prepared."""
-
-    async def abort(self) -> None:
-        """See Prepared."""
