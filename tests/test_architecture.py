@@ -50,6 +50,7 @@ LAYERS: dict[str, set[str]] = {
     "canopen": {"canopen", "core.definition", "loop", "machine.netlink"},
     "dashboard": {"dashboard", "loop"},
     "simulator": {"report.format", "rtde", "simulator"},
+    "sparkplug": {"sparkplug"},
     "mapping": {
         "core.definition",
         "links.contract",
@@ -290,6 +291,7 @@ PURE = (
     "plc",
     "report",
     "rtde",
+    "sparkplug",
     "web",
 )
 """Packages without socket, event loop and clock: time is a parameter."""
