@@ -506,7 +506,7 @@ def log_lines() -> object:
         configure(Format.JSON, logging.DEBUG, stream)
         for kind in EventKind:
             for variable, lock in ((0, None), (None, 0)):
-                log(Event(3.0, kind, variable, lock, 0, 1, Reason.HELD, False, True, 2, "why", "10.0.0.1"))
+                log(Event(3.0, kind, variable, lock, 0, 1, Reason.HELD, False, True, 2, "why", "192.0.2.1"))
     finally:
         root.handlers[:], level, logging.raiseExceptions = before
         root.setLevel(level)

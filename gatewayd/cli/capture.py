@@ -139,7 +139,7 @@ def _checksum(data: bytes) -> int:
 
 
 def _split(end: str) -> tuple[bytes, int]:
-    """Address and port of `10.0.0.1:502`; an end that is none is 0.0.0.0, port 0."""
+    """Address and port of `192.0.2.1:502`; an end that is none is 0.0.0.0, port 0."""
     try:
         host, port = parse_address(end)
         return ip_address(host.partition("%")[0]).packed, port

@@ -29,7 +29,7 @@ _Form = Callable[[Row], bytes]
     epilog="""\b
 Examples:
   gatewayd trace                            everything, until Ctrl-C
-  gatewayd trace --link modbus --peer 192.168.1.20
+  gatewayd trace --link modbus --peer 192.0.2.20
   gatewayd trace --link canopen --format candump -o bus.log
   gatewayd trace --seconds 60s --format pcap -o cell.pcapng
   gatewayd trace --format pcap | wireshark -k -i -

@@ -37,5 +37,5 @@ def new_connection() -> int:
 
 
 def host_of(peer: str) -> str:
-    """The peer's address without its port (`10.0.0.1:502`, `[fe80::1]:502`), which each connection has another one."""
+    """The peer's address without its port (`192.0.2.1:502`, `[fe80::1]:502`), which each connection has another one."""
     return peer.rpartition(":")[0] if peer.count(":") == 1 or "]:" in peer else peer

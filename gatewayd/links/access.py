@@ -85,7 +85,7 @@ class ScanOrder:
     """What somebody wants to know of a line."""
 
     line: str
-    """`192.168.1.30:502`, `/dev/ttyUSB0`, `can0`."""
+    """`192.0.2.30:502`, `/dev/ttyUSB0`, `can0`."""
     first: int | None = None
     last: int | None = None
     """Numbers that are asked, both included; None: all that there can be."""

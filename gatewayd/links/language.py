@@ -125,7 +125,7 @@ class LinkLanguage:
     """Whether who writes by this kind means each value that it writes, so that it may give commands
     (`core.commands`)."""
     writer_example: ClassVar[str] = ""
-    """How a writer is made known: `modbus: 192.168.1.20`."""
+    """How a writer is made known: `modbus: 192.0.2.20`."""
     way: ClassVar[str] = ""
     """What people call writing by this kind, where it is only one service; empty: as its key."""
     supervision_example: ClassVar[str] = ""
@@ -138,7 +138,7 @@ class LinkLanguage:
         return False
 
     def names(self, writer: WriterSpec) -> Sequence[str]:
-        """How the writer is known, in words: `192.168.1.20`, `RPDO, heartbeat of node 1`."""
+        """How the writer is known, in words: `192.0.2.20`, `RPDO, heartbeat of node 1`."""
         return ()
 
     def silence(self, writer: WriterSpec) -> float | None:

@@ -313,7 +313,7 @@ class _Reader:
         elif kind == "string_pattern_mismatch":
             message = f"{text} is not a host name or IP address"
             host = text.strip("`").partition("//")[2].partition("/")[0]
-            self._find(syntax.BAD_NETWORK, message, value, f"write {host or '192.168.1.10'}")
+            self._find(syntax.BAD_NETWORK, message, value, f"write {host or '192.0.2.10'}")
         else:
             message = f"`{name}` is {text}: {_SIZES.get(kind, 'wrong number of values')}"
             self._find(syntax.WRONG_TYPE, message, value, _field_hint(inner, name))

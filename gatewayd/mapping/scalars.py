@@ -162,7 +162,7 @@ class ListenAddress:
 
 
 def _unmapped(address: IPv4Address | IPv6Address) -> IPv4Address | IPv6Address:
-    """An IPv4-mapped address (`::ffff:192.168.1.20`) is an IPv4 address in the notation of IPv6."""
+    """An IPv4-mapped address (`::ffff:192.0.2.20`) is an IPv4 address in the notation of IPv6."""
     return (isinstance(address, IPv6Address) and address.ipv4_mapped) or address
 
 
@@ -199,21 +199,19 @@ Listen = Annotated[
 
 
 def _host(text: str) -> str:
-    """What looks like an address must be one: no name server will know `192.168.1.300`."""
+    """What looks like an address must be one: no name server will know `192.0.2.300`."""
     if _NUMBERS.fullmatch(text):
         try:
             IPv4Address(text)
         except ValueError:
-            hint = "write four numbers from 0 to 255 without leading zeros, for example 192.168.1.10"
+            hint = "write four numbers from 0 to 255 without leading zeros, for example 192.0.2.10"
             refuse(syntax.BAD_NETWORK, f"`{text}` is not an IP address", hint)
     elif ":" in text:
         try:
             return str(_unmapped(IPv6Address(text)))
         except ValueError:
             host, _, port = text.partition(":")
-            hint = (
-                f"write `host: {host}` and `port: {port}`" if port.isdigit() else "for example 192.168.1.10"
-            )
+            hint = f"write `host: {host}` and `port: {port}`" if port.isdigit() else "for example 192.0.2.10"
             refuse(syntax.BAD_NETWORK, f"`{text}` is neither a host name nor an IP address", hint)
     return text
 
@@ -230,7 +228,7 @@ Network: TypeAlias = IPv4Network | IPv6Network
 
 
 def _network(value: object) -> Network:
-    hint = "write an address (192.168.1.20) or a network (192.168.1.0/28)"
+    hint = "write an address (192.0.2.20) or a network (192.0.2.0/28)"
     text = scalar(value, "an IP address or network", hint)
     try:
         network = ip_network(text)
@@ -261,7 +259,7 @@ def one_or_many(value: object) -> object:
     return (value,)
 
 
-_NETWORK_SCHEMA = Annotated[str, Field(examples=["192.168.1.20", "192.168.1.0/28"])]
+_NETWORK_SCHEMA = Annotated[str, Field(examples=["192.0.2.20", "192.0.2.0/28"])]
 _OneNetwork = Annotated[
     IPv4Network | IPv6Network, BeforeValidator(_network, json_schema_input_type=_NETWORK_SCHEMA)
 ]

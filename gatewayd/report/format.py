@@ -132,7 +132,7 @@ def parse_address(text: str, default: int | None = None) -> tuple[str, int]:
     port = default if port is None else port
     least, form = 0, "HOST:PORT, say 127.0.0.1:9502 or [::1]:9502"
     if default is not None:
-        least, form = 1, f"HOST or HOST:PORT, say 192.168.1.10 or robot.local:{default}"
+        least, form = 1, f"HOST or HOST:PORT, say 192.0.2.10 or robot.local:{default}"
     if not host or port is None or not least <= port <= MAX_PORT:
         raise ValueError(f"{text!r} is not {form}")
     return host, port

@@ -23,7 +23,9 @@ def can(frame: Frame, own: str = "can0") -> Captured:
     return Captured(NOW, Medium.CAN, 0, "", own, False, packed(frame))
 
 
-def modbus(data: bytes, outgoing: bool, peer: str = "10.0.0.7:4000", own: str = "10.0.0.1:1502") -> Captured:
+def modbus(
+    data: bytes, outgoing: bool, peer: str = "192.0.2.7:4000", own: str = "192.0.2.1:1502"
+) -> Captured:
     return Captured(NOW, Medium.TCP_SERVER, 502, peer, own, outgoing, data)
 
 
@@ -84,7 +86,7 @@ def test_both_directions_of_a_connection_fit_each_other() -> None:
 
 @pytest.mark.parametrize(
     "peer, own",
-    [("10.0.0.7:4000", "10.0.0.1:502"), ("[fe80::7]:4000", "[fe80::1]:502"), ("", "10.0.0.1:502")],
+    [("192.0.2.7:4000", "192.0.2.1:502"), ("[fe80::7]:4000", "[fe80::1]:502"), ("", "192.0.2.1:502")],
 )
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="no tshark")
 def test_wireshark_reads_it(tmp_path: Path, peer: str, own: str) -> None:
@@ -94,7 +96,7 @@ def test_wireshark_reads_it(tmp_path: Path, peer: str, own: str) -> None:
         modbus(ASK, False, peer, own),
         modbus(ANSWER, True, peer, own),
         can(Frame(0x185, b"\1\xab")),
-        Captured(NOW, Medium.TCP_CLIENT, 30004, "192.168.1.10:39004", "10.0.0.1:5000", True, bytes(3000)),
+        Captured(NOW, Medium.TCP_CLIENT, 30004, "192.0.2.10:39004", "192.0.2.1:5000", True, bytes(3000)),
     ]
     path.write_bytes(b"".join(map(writer.blocks, passages)))
     options = ["-o", "tcp.check_checksum:TRUE", "-o", "ip.check_checksum:TRUE"]

@@ -23,7 +23,7 @@ def test_a_healthy_gateway(gateway: Running, invoke: Invoke) -> None:
     done = invoke("status")
     assert done.exit_code == 0
     for words in (
-        "is healthy", "press  press.yaml, mapping", "192.168.1.10:30004 fresh",
+        "is healthy", "press  press.yaml, mapping", "192.0.2.10:30004 fresh",
         "127.0.0.1:1502 unit 1 listening, no connections",
         "plc connected", "owns 1 of 3 locks", "hmi has not connected yet", "12, all good", "motion: plc",
         "1 accepted, 0 refused", "plc took motion",

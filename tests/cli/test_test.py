@@ -14,10 +14,10 @@ ROOT = Path(__file__).parents[2]
 HEAD = """\
 gatewayd: 1
 cell: press-3
-robot: {host: 192.168.1.10}
-modbus: {listen: '192.168.1.2:1502'}
+robot: {host: 192.0.2.10}
+modbus: {listen: '192.0.2.2:1502'}
 writers:
-  plc: {modbus: 192.168.1.20, timeout: 1s}
+  plc: {modbus: 192.0.2.20, timeout: 1s}
 variables:
   speed: {robot: input_double_register_0, modbus: 0, owner: plc}
 """

@@ -16,7 +16,7 @@ from gatewayd.modbus.frames import encode
 from tests.cli.conftest import Invoke, Running
 
 ASK, ANSWER = encode(7, 1, bytes.fromhex("03 0064 0002")), encode(7, 1, bytes.fromhex("03 04 0001 0002"))
-PEER, OWN = "10.0.0.7:4000", "10.0.0.1:502"
+PEER, OWN = "192.0.2.7:4000", "192.0.2.1:502"
 
 Pass = Callable[[], None]
 

@@ -15,11 +15,11 @@ from gatewayd.mapping.plan import Plan
 MAPPING = """\
 gatewayd: 1
 cell: {name}
-robot: {{host: 192.168.1.10, watchdog: {{field: input_int_register_23, frequency: 10, requires: [plc]}}}}
+robot: {{host: 192.0.2.10, watchdog: {{field: input_int_register_23, frequency: 10, requires: [plc]}}}}
 modbus: {{listen: '127.0.0.1:{port}', unit: 1}}
 writers:
-  plc: {{modbus: 192.168.1.20}}
-  hmi: {{modbus: 192.168.1.21, timeout: 1s}}
+  plc: {{modbus: 192.0.2.20}}
+  hmi: {{modbus: 192.0.2.21, timeout: 1s}}
 groups:
   motion: {{owner: [plc, hmi], lease: 2s}}
 variables:
@@ -68,7 +68,7 @@ class Served:
     cell: Cell
 
     def __post_init__(self) -> None:
-        self.source = ServedSource(LinkHealth(figures={"address": "192.168.1.10:30004", "watchdog": False}))
+        self.source = ServedSource(LinkHealth(figures={"address": "192.0.2.10:30004", "watchdog": False}))
         unit = LinkHealth(
             "Modbus 127.0.0.1:1502", words="listening, no connections", figures={"connections": 0}
         )

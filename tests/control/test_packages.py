@@ -15,7 +15,7 @@ from tests.control.served import FixedGateway, Served
 from tests.works import finished
 
 
-def layout(names: Sequence[str] = ("timestamp",), robot: str = "10.0.0.5:30004") -> PackageLayout:
+def layout(names: Sequence[str] = ("timestamp",), robot: str = "192.0.2.5:30004") -> PackageLayout:
     packing = struct.Struct(f">{len(names)}d")
     return PackageLayout(robot, tuple(names), ("DOUBLE",) * len(names), 0.002, lambda v: packing.pack(*v))
 
@@ -40,7 +40,7 @@ def test_layout_packages_and_losses_come_in_their_order() -> None:
     assert rows(feed) == [
         {
             "layout": {
-                "cell": "press", "robot": "10.0.0.5:30004", "names": ["timestamp"], "types": ["DOUBLE"],
+                "cell": "press", "robot": "192.0.2.5:30004", "names": ["timestamp"], "types": ["DOUBLE"],
                 "period": 0.002,
             }
         }

@@ -37,7 +37,7 @@ def test_a_gateway_says_what_it_serves(gateway: Running) -> None:
     assert (cell.name, cell.socket) == ("press", str(gateway.path))
     assert {variable["name"] for variable in cell.variables} >= {"start", "limit"}
     (robot,) = cell.links("Universal Robots controller")
-    assert robot["address"] == "192.168.1.10:30004"
+    assert robot["address"] == "192.0.2.10:30004"
 
 
 def test_a_socket_without_an_answer_has_its_reason(tmp_path: Path) -> None:

@@ -280,7 +280,9 @@ async def test_packages_of_the_robot_are_followed(
         tap = await taps.get()
         assert tap is not None
         pack = struct.Struct(">d").pack
-        tap.begin(PackageLayout("10.0.0.5", ("timestamp",), ("DOUBLE",), 0.002, lambda values: pack(*values)))
+        tap.begin(
+            PackageLayout("192.0.2.5", ("timestamp",), ("DOUBLE",), 0.002, lambda values: pack(*values))
+        )
         tap.package((1.5,), 2.0)
         tap.lost("pulled")
     head, packages, lost = reading.result()

@@ -11,8 +11,8 @@ MODBUS = ("", "modbus", "modbus")
 ROBOT = ("press", "robot", "robot")
 
 
-def passage(peer: str = "10.0.0.7:4000", cell: str | None = "press", size: int = 4) -> Passage:
-    return Passage(1.0, bytes(size), False, peer, "10.0.0.1:502", cell)
+def passage(peer: str = "192.0.2.7:4000", cell: str | None = "press", size: int = 4) -> Passage:
+    return Passage(1.0, bytes(size), False, peer, "192.0.2.1:502", cell)
 
 
 def rows(trace: Trace, most: int = 100) -> list[Row]:
@@ -28,9 +28,9 @@ def rows(trace: Trace, most: int = 100) -> list[Row]:
         ({"cell": "other"}, False),
         ({"link": "modbus"}, True),
         ({"link": "robot"}, False),
-        ({"peer": "10.0.0.7"}, True),
-        ({"peer": "10.0.0.7:4000"}, True),
-        ({"peer": "10.0.0.70"}, False),
+        ({"peer": "192.0.2.7"}, True),
+        ({"peer": "192.0.2.7:4000"}, True),
+        ({"peer": "192.0.2.70"}, False),
     ],
 )
 def test_filters(chosen: dict[str, str], passes: bool) -> None:
@@ -48,11 +48,11 @@ def test_what_concerns_no_cell_is_in_the_trace_of_every_cell() -> None:
 
 def test_a_row_has_everything_raw() -> None:
     trace = Trace()
-    trace.take(ROBOT, Passage(1.25, b"\1\2", True, "192.168.1.10:30004", "192.168.1.2:40000"))
+    trace.take(ROBOT, Passage(1.25, b"\1\2", True, "192.0.2.10:30004", "192.0.2.2:40000"))
     assert rows(trace) == [
         {
-            "time": 101.25, "cell": "press", "link": "robot", "kind": "robot", "peer": "192.168.1.10:30004",
-            "own": "192.168.1.2:40000", "out": True, "data": "0102",
+            "time": 101.25, "cell": "press", "link": "robot", "kind": "robot", "peer": "192.0.2.10:30004",
+            "own": "192.0.2.2:40000", "out": True, "data": "0102",
         }
     ]  # fmt: skip
 

@@ -31,7 +31,7 @@ PLC, HMI = 0, 1
 
 def test_the_status_has_the_documented_fields(api: Api, press: Served) -> None:
     assert press.cell.write(Requester(PLC), [Change(LIMIT, 999.0)], 0.5) is not None
-    press.cell.unserved(Requester(None, "10.0.0.7"), Unserved.NO_SUCH_UNIT, "asked unit 7", 0.5)
+    press.cell.unserved(Requester(None, "192.0.2.7"), Unserved.NO_SUCH_UNIT, "asked unit 7", 0.5)
     status = finished(api.status(at(1.0)))
     (cell,) = status["cells"]
     assert status.keys() == documented()["status"].keys()
@@ -234,7 +234,7 @@ def test_every_link_is_told_in_words(api: Api) -> None:
     assert robot.keys() == documented()["link"].keys()
     assert (robot["name"], robot["address"], robot["words"]) == (
         "robot",
-        "192.168.1.10:30004",
+        "192.0.2.10:30004",
         "fresh and writable",
     )
     assert (modbus["title"], modbus["level"]) == ("Modbus TCP server", "good")

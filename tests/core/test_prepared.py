@@ -23,7 +23,7 @@ from tests.core.conftest import HMI, PLC
 START, LAMP, PART, FORCE, SPEED, PATH, CYCLES = range(7)
 ALL = (START, LAMP, PART, FORCE, SPEED, PATH)
 VALUES: list[Value] = [True, False, 7, 20.0, 0.5, 3]
-OWNER = Requester(PLC, "10.0.0.1:5000", 11)
+OWNER = Requester(PLC, "192.0.2.1:5000", 11)
 
 
 def state(cell: Cell) -> object:
@@ -66,7 +66,7 @@ def test_it_does_what_the_thorough_way_does(
         for cell, record in zip((prepared_cell, thorough_cell), heard, strict=True):
             cell.write_listeners.append(lambda *written, record=record: record.append(written))
     values = [given_values[(bool, int, float).index(type(VALUES[index]))] for index in chosen]
-    asking = Requester(PLC, "10.0.0.1:5001", connection)
+    asking = Requester(PLC, "192.0.2.1:5001", connection)
     before = state(prepared_cell)
     done = PreparedWrite(prepared_cell, chosen).write(asking, values, 2.0)
     if not done:

@@ -94,12 +94,12 @@ def test_refusals_of_one_peer_are_never_told_of_another() -> None:
     reported: list[Event] = []
     log = RefusalLog(reported.append)
     for step in range(10):
-        for host in ("192.168.1.30", "192.168.1.31", "[fe80::1]"):
+        for host in ("192.0.2.30", "192.0.2.31", "[fe80::1]"):
             log.add(refusal(step * 0.1, writer=None, peer=f"{host}:{50_000 + step}"))
     log.tick(REFUSAL_INTERVAL)
     assert [(event.peer.rpartition(":")[0], 1 + event.repeats) for event in reported] == [
-        ("192.168.1.30", 1), ("192.168.1.31", 1), ("[fe80::1]", 1),
-        ("192.168.1.30", 9), ("192.168.1.31", 9), ("[fe80::1]", 9),
+        ("192.0.2.30", 1), ("192.0.2.31", 1), ("[fe80::1]", 1),
+        ("192.0.2.30", 9), ("192.0.2.31", 9), ("[fe80::1]", 9),
     ]  # fmt: skip
 
 
@@ -121,10 +121,10 @@ def test_peers_are_told_apart_up_to_a_bound_and_those_beyond_it_have_no_address(
     assert sum(1 + event.repeats for event in reported) == 1000
     assert len({event.peer for event in reported if event.peer}) == MAX_PEERS
     assert {event.peer for event in reported[MAX_PEERS:]} == {""}
-    log.add(refusal(2 * REFUSAL_INTERVAL, writer=None, peer="192.168.1.30:502"))
+    log.add(refusal(2 * REFUSAL_INTERVAL, writer=None, peer="192.0.2.30:502"))
     log.tick(4 * REFUSAL_INTERVAL)
-    log.add(refusal(5 * REFUSAL_INTERVAL, writer=None, peer="192.168.1.30:502"))
-    assert reported[-1].peer == "192.168.1.30:502"
+    log.add(refusal(5 * REFUSAL_INTERVAL, writer=None, peer="192.0.2.30:502"))
+    assert reported[-1].peer == "192.0.2.30:502"
 
 
 def test_addresses_of_version_6_are_told_apart() -> None:

@@ -30,14 +30,14 @@ def test_every_reason_has_its_words() -> None:
 
 
 def test_what_is_asked_in_vain_is_counted_and_said_once_for_each_peer_and_reason(cell: Cell) -> None:
-    stranger = Requester(None, "10.0.0.7")
+    stranger = Requester(None, "192.0.2.7")
     for moment in range(5):
         cell.unserved(Requester(PLC), Unserved.NO_SUCH_UNIT, "asked unit 7; units here: 1", moment)
         cell.unserved(stranger, Unserved.NO_SUCH_UNIT, "asked unit 9; units here: 1", moment)
     cell.unserved(Requester(PLC), Unserved.MALFORMED, "asked for function 3: quantity 0", 5.0)
     assert texts(cell) == [
         "plc asked unit 7; units here: 1",
-        "undeclared peer 10.0.0.7 asked unit 9; units here: 1",
+        "undeclared peer 192.0.2.7 asked unit 9; units here: 1",
         "plc asked for function 3: quantity 0",
     ]
     assert cell.health.unserved[Unserved.NO_SUCH_UNIT] == 10

@@ -214,7 +214,7 @@ def test_what_cannot_be_served_is_told_and_the_rest_runs(plant: Plant, tmp_path:
     simulator = plant.simulator()
     broken = tmp_path / "broken.yaml"
     broken.write_text(
-        "gatewayd: 1\ncell: broken\nrobot: {host: 10.0.0.1}\nvariables:\n  x: {robot: no_such_field}\n"
+        "gatewayd: 1\ncell: broken\nrobot: {host: 192.0.2.1}\nvariables:\n  x: {robot: no_such_field}\n"
     )
     missing, secret = tmp_path / "missing.yaml", unreadable(tmp_path)
     good = plant.mapping(CELL, simulator.port)

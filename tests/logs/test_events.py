@@ -74,10 +74,10 @@ def test_a_refusal_names_everybody(cell: Cell, caplog: pytest.LogCaptureFixture)
 
 def test_a_peer_without_a_name_is_undeclared(cell: Cell, caplog: pytest.LogCaptureFixture) -> None:
     cell.events.append(
-        Event(1.0, EventKind.REFUSED, variable=1, reason=Reason.NOT_WRITABLE, peer="192.168.1.77")
+        Event(1.0, EventKind.REFUSED, variable=1, reason=Reason.NOT_WRITABLE, peer="192.0.2.77")
     )
     fields = reported(caplog)[2]
-    assert (fields["writer"], fields["peer"]) == ("undeclared", "192.168.1.77")
+    assert (fields["writer"], fields["peer"]) == ("undeclared", "192.0.2.77")
 
 
 def test_a_value_out_of_limits_is_told_with_them(cell: Cell, caplog: pytest.LogCaptureFixture) -> None:

@@ -35,7 +35,7 @@ def test_texts_of_a_controller_that_talks_are_few_lines(written: Log) -> None:
 def test_wrong_tokens_are_few_lines_whatever_is_asked_for(written: Log) -> None:
     for number in range(9000):
         written.now += 1 / 3000
-        peer = f"192.168.1.7:{number % 60_000}"
+        peer = f"192.0.2.7:{number % 60_000}"
         log.warning("a request without the right token", extra=fields(peer=peer, path=f"/{number}"))
         written.flush()
     assert len(written.lines()) <= EACH + 1
@@ -45,7 +45,7 @@ def test_wrong_tokens_are_few_lines_whatever_is_asked_for(written: Log) -> None:
 
 
 def test_peers_are_told_apart_by_their_address_alone(written: Log) -> None:
-    for peer in ("192.168.1.7:{}", "192.168.1.8:{}", "[fe80::1]:{}", "[fe80::2]:{}", "fe80::3", "fe80::4"):
+    for peer in ("192.0.2.7:{}", "192.0.2.8:{}", "[fe80::1]:{}", "[fe80::2]:{}", "fe80::3", "fe80::4"):
         for port in range(2 * EACH):
             log.warning("refused", extra=fields(peer=peer.format(port)))
     assert len(written.lines()) == 6 * EACH

@@ -40,8 +40,8 @@ def written(form: Format, text: str, level: int = logging.INFO, **values: object
 def test_text_line_has_utc_time_level_event_and_fields(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("time.time", lambda: 1_795_338_000.123)
     monkeypatch.setattr("time.time_ns", lambda: 1_795_338_000_123_000_000)
-    line = written(Format.TEXT, "robot connected", cell="press-3", host="192.168.1.10")
-    assert line == "2026-11-22T09:00:00.123Z info  robot connected cell=press-3 host=192.168.1.10\n"
+    line = written(Format.TEXT, "robot connected", cell="press-3", host="192.0.2.10")
+    assert line == "2026-11-22T09:00:00.123Z info  robot connected cell=press-3 host=192.0.2.10\n"
 
 
 @pytest.mark.parametrize(

@@ -36,13 +36,13 @@ def test_processes_whose_connections_cannot_be_seen_may_have_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hidden: bool
 ) -> None:
     (tmp_path / "net").mkdir()
-    line = "0: 0100007F:A000 0A01A8C0:7534 01 00000000:00000000 00:00000000 00000000 0 0 77 1"
+    line = "0: 0100007F:A000 0A0200C0:7534 01 00000000:00000000 00:00000000 00000000 0 0 77 1"
     (tmp_path / "net" / "tcp").write_text(f"head\n{line}\n")
     process = tmp_path / "12"
     process.mkdir()
     (process / "cmdline").write_bytes(b"gatewayd\0run\0")
     (process / "fd").mkdir()
-    address = ("192.168.1.10", 30004)
+    address = ("192.0.2.10", 30004)
     if hidden:
         monkeypatch.setattr(connections, "socket_inodes", _refused)
     else:

@@ -136,7 +136,7 @@ ODD_VALUES: list[Tree] = [
     None, True, False, 0, -1, 1, 15, 16, 65535, 65536, 10**30, 0.5, -0.0, 1e308, "", "none", "any", "hold", "clear",
     "exception", "0.16", "40001", "input_int_register_0..23", "output_double_register_0..47", "actual_TCP_pose",
     "actual_TCP_pose[0..5]", "actual_digital_input_bits.0..17", "input_bit_registers0_to_31", "runtime_state",
-    "standard_digital_output.3", "speed_slider_fraction", "1s", "5", "::1", "0.0.0.0/0", "::/0", "192.168.1.20",
+    "standard_digital_output.3", "speed_slider_fraction", "1s", "5", "::1", "0.0.0.0/0", "::/0", "192.0.2.20",
     "plc", "motion", [], {}, [[]], {"": None}, ["plc", "plc"], {"holding": 3}, {"coil": 0, "holding": 1},
     {"holding": "5.3", "type": "float64", "scale": 0.001}, {"input": 7, "type": "bool", "order": "DCBA"},
     [{"holding": 9, "type": "uint64", "scale": 1e-300, "offset": 1e300}], [0, 1], [1, 0], [0.5, 0.5],
@@ -253,7 +253,7 @@ HUGE = {
     + b"".join(f" v{n}: {{robot: output_double_register_0..47, modbus: 0}}\n".encode() for n in range(300)),
     "many networks": b"gatewayd: 1\ncell: a\nrobot: {host: a}\nwriters: {plc: {modbus: ["
     + b", ".join(f"10.{n // 250}.{n % 250}.0/24".encode() for n in range(2_000))
-    + b"]}, hmi: {modbus: 10.0.0.0/8}}\nvariables: {a: {robot: input_int_register_0}}\n",
+    + b"]}, hmi: {modbus: 198.51.100.0/24}}\nvariables: {a: {robot: input_int_register_0}}\n",
     "beyond the limit": b"#" * 1_100_000,
     "a wide range": b"gatewayd: 1\ncell: a\nrobot: {host: a}\nvariables: {a: {robot: output_int_register_0..9999}}\n",
 }

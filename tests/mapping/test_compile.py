@@ -27,22 +27,22 @@ from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.source import parse
 from gatewayd.modbus.areas import Area
 
-FINGERPRINT = 0x3DE7_CFA4
+FINGERPRINT = 0xABC6_4CDE
 """Of `GOOD`, since the first version of the language."""
 
 GOOD = """gatewayd: 1
 cell: press-3
 robot:
-  host: 192.168.1.10
+  host: 192.0.2.10
   series: e
   frequency: 250
   watchdog: {field: input_int_register_23, frequency: 5, requires: [plc]}
 modbus:
   listen: 127.0.0.1:1502
-  allow: [192.168.1.0/24]
+  allow: [192.0.2.0/24]
 writers:
-  hmi: {modbus: [192.168.1.0/28, 192.168.1.21], timeout: 3s}
-  plc: {modbus: 192.168.1.20}
+  hmi: {modbus: [192.0.2.0/28, 192.0.2.21], timeout: 3s}
+  plc: {modbus: 192.0.2.20}
 groups:
   motion: {owner: [plc, hmi], lease: 2s}
 variables:
@@ -117,7 +117,7 @@ def test_robot_plan_lists_fields_by_first_variable() -> None:
         "input_double_register_1",
     )
     assert robot.watchdog == WatchdogPlan("input_int_register_23", 5.0, (1,))
-    assert (robot.host, robot.port, robot.frequency, robot.verify) == ("192.168.1.10", 30004, 250.0, True)
+    assert (robot.host, robot.port, robot.frequency, robot.verify) == ("192.0.2.10", 30004, 250.0, True)
 
 
 def test_modbus_plan() -> None:
@@ -125,11 +125,11 @@ def test_modbus_plan() -> None:
     modbus = compiled().the(ModbusPlan)
     assert modbus is not None
     assert (modbus.host, modbus.port, modbus.unit, modbus.fill_gaps) == ("127.0.0.1", 1502, 1, False)
-    assert [str(network) for network in modbus.allow] == ["192.168.1.0/24"]
+    assert [str(network) for network in modbus.allow] == ["192.0.2.0/24"]
     assert [(str(network), writer) for network, writer in modbus.writers] == [
-        ("192.168.1.20/32", 1),
-        ("192.168.1.21/32", 0),
-        ("192.168.1.0/28", 0),
+        ("192.0.2.20/32", 1),
+        ("192.0.2.21/32", 0),
+        ("192.0.2.0/28", 0),
     ]
     places = [
         (placed.variable, placed.area, placed.address, placed.bit, placed.words)
@@ -153,7 +153,7 @@ def test_modbus_plan() -> None:
 
 CANOPEN = """gatewayd: 1
 cell: press-3
-robot: {host: 192.168.1.10}
+robot: {host: 192.0.2.10}
 canopen:
   channel: can0
   bitrate: 500000
@@ -307,7 +307,7 @@ def test_compiling_is_deterministic() -> None:
         ("{robot: timestamp, modbus: 30}", "{modbus: 30, robot: timestamp}"),
         ("{robot: timestamp, modbus: 30}", "{robot: 'timestamp', modbus: {holding: 30, type: float64}}"),
         ("timeout: 3s", "timeout: 3000ms"),
-        ("modbus: 192.168.1.20", "modbus: [192.168.1.20/32]"),
+        ("modbus: 192.0.2.20", "modbus: [192.0.2.20/32]"),
         ("frequency: 250", "frequency: 250.0"),
     ],
 )
@@ -319,13 +319,13 @@ def test_fingerprint_stays_with_the_meaning(old: str, new: str) -> None:
 
 CHANGES = [
     ("cell: press-3", "cell: press-4"),
-    ("192.168.1.10", "192.168.1.11"),
+    ("192.0.2.10", "192.0.2.11"),
     ("frequency: 250", "frequency: 125"),
     ("frequency: 5", "frequency: 6"),
     ("requires: [plc]", "requires: [hmi]"),
     ("127.0.0.1:1502", "127.0.0.1:1503"),
-    ("allow: [192.168.1.0/24]", "allow: [192.168.0.0/16]"),
-    ("192.168.1.21", "192.168.1.22"),
+    ("allow: [192.0.2.0/24]", "allow: [192.0.2.0/23]"),
+    ("192.0.2.21", "192.0.2.22"),
     ("timeout: 3s", "timeout: 4s"),
     ("lease: 2s", "lease: 3s"),
     ("owner: [plc, hmi]", "owner: [hmi, plc]"),
@@ -386,8 +386,8 @@ def test_adopted_inputs_wait_for_an_owner(written: str, seconds: float | None) -
 
 def test_writers_keep_what_they_promise() -> None:
     plan = keyed(
-        ("192.168.1.21], timeout: 3s}", "192.168.1.21], timeout: 3s, timeout_counts: writes, grace: 500ms}"),
-        ("plc: {modbus: 192.168.1.20}", "plc: {canopen: sdo, node: 1, heartbeat: 1s, grace: none}"),
+        ("192.0.2.21], timeout: 3s}", "192.0.2.21], timeout: 3s, timeout_counts: writes, grace: 500ms}"),
+        ("plc: {modbus: 192.0.2.20}", "plc: {canopen: sdo, node: 1, heartbeat: 1s, grace: none}"),
         ("writers:\n", "canopen: {channel: can0, bitrate: 500000, node: 16}\nwriters:\n"),
     )
     assert plan.cell.writers == (

@@ -13,7 +13,7 @@ from gatewayd.mapping.loader import load
 from gatewayd.modbus.codec import ORDERS, TYPES
 
 MAPPINGS = sorted((Path(__file__).parents[2] / "mappings").glob("*.yaml"))
-HEAD = "gatewayd: 1\ncell: all\nrobot: {host: 10.0.0.1}\nmodbus: {listen: '127.0.0.1:1502'}\nvariables:\n"
+HEAD = "gatewayd: 1\ncell: all\nrobot: {host: 192.0.2.1}\nmodbus: {listen: '127.0.0.1:1502'}\nvariables:\n"
 
 
 def compiled(data: bytes, name: str) -> CompiledFile:

@@ -26,8 +26,8 @@ def test_keys_come_in_the_order_of_the_kinds() -> None:
 
 
 def test_a_kind_finds_its_own_keys() -> None:
-    writer = WRITER.model_validate({"modbus": "10.0.0.1", "canopen": "rpdo"})
-    assert [str(network) for network in writer.by(ModbusWriter).modbus] == ["10.0.0.1/32"]
+    writer = WRITER.model_validate({"modbus": "192.0.2.1", "canopen": "rpdo"})
+    assert [str(network) for network in writer.by(ModbusWriter).modbus] == ["192.0.2.1/32"]
     assert writer.by(CanopenWriter).by_rpdo
 
 
@@ -38,5 +38,5 @@ def test_a_writer_needs_some_link() -> None:
     assert mistake.kind == "missing-key"
     assert mistake.context == {
         "message": "a writer needs the key `modbus`, `canopen` or `device`, by which it is known",
-        "hint": "add for example `modbus: 192.168.1.20`, `canopen: rpdo` or `device: island`",
+        "hint": "add for example `modbus: 192.0.2.20`, `canopen: rpdo` or `device: island`",
     }

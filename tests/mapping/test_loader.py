@@ -81,7 +81,7 @@ def test_no_bytes_raise(data: bytes) -> None:
 
 
 SNIPPETS = b"""0 -1 0.16 65535 65536 400001 60000 1e9 .inf 0x10 ~ [] {} any plc none hold exception true 5s 0ms bit bool
-uint64 float32 CDAB 10.0.0.0/8 0.0.0.0:1 '[::1]:1' input_bit_register_0..127 output_double_register_0..47 actual_q
+uint64 float32 CDAB 198.51.100.0/24 0.0.0.0:1 '[::1]:1' input_bit_register_0..127 output_double_register_0..47 actual_q
 'actual_q[9]' robot_mode.3 timestamp * & ! | > : - , ' " #""".split()
 
 

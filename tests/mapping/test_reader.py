@@ -117,21 +117,21 @@ def test_hint_names_the_remedy(line: str, words: str) -> None:
 @pytest.mark.parametrize(
     "host, hint",
     [
-        ("192.168.1.300", "four numbers"),
-        ("192.168.1", "four numbers"),
-        ("192.168.1.010", "leading zeros"),
-        ("192.168.1.10:30004", "`port: 30004`"),
-        ("robot:rtde", "192.168.1.10"),
+        ("192.0.2.300", "four numbers"),
+        ("192.0.2", "four numbers"),
+        ("192.0.2.010", "leading zeros"),
+        ("192.0.2.10:30004", "`port: 30004`"),
+        ("robot:rtde", "192.0.2.10"),
     ],
 )
 def test_what_looks_like_an_address_must_be_one(host: str, hint: str) -> None:
-    """No name server knows `192.168.1.300`, and the plant would be the first to tell."""
+    """No name server knows `192.0.2.300`, and the plant would be the first to tell."""
     finding = only(f"gatewayd: 1\ncell: c\nrobot: {{host: '{host}'}}\nvariables: {{}}")
     assert place(finding) == ("bad-network-address", 3, 15)
     assert hint in str(finding.hint)
 
 
-@pytest.mark.parametrize("host", ["192.168.1.10", "fe80::1%eth0", "::1", "ur10-press.plant.local", "ur10"])
+@pytest.mark.parametrize("host", ["192.0.2.10", "fe80::1%eth0", "::1", "ur10-press.plant.local", "ur10"])
 def test_hosts(host: str) -> None:
     _, findings = read(f"gatewayd: 1\ncell: c\nrobot: {{host: '{host}'}}\nvariables: {{}}")
     assert findings == ()

@@ -22,11 +22,11 @@ RULES = catalogue.complete()
 HEAD = """\
 gatewayd: 1
 cell: press-3
-robot: {host: 192.168.1.10}
-modbus: {listen: '192.168.1.2:1502'}
+robot: {host: 192.0.2.10}
+modbus: {listen: '192.0.2.2:1502'}
 writers:
-  plc: {modbus: 192.168.1.20, timeout: 1s}
-  hmi: {modbus: 192.168.1.21, timeout: 1s}
+  plc: {modbus: 192.0.2.20, timeout: 1s}
+  hmi: {modbus: 192.0.2.21, timeout: 1s}
 variables:
   keep: {robot: input_bit_register_63, modbus: 999.15, owner: [plc, hmi]}
 """
@@ -335,18 +335,18 @@ def test_finer_points(lines: str, expected: list[tuple[str, int]]) -> None:
 @pytest.mark.parametrize(
     "first, second, clash",
     [
-        ("0.0.0.0", "192.168.1.2", True),
+        ("0.0.0.0", "192.0.2.2", True),
         ("[::]", "[fd00::2]", True),
         ("[::]", "0.0.0.0", False),
-        ("[::]", "192.168.1.2", False),
-        ("[::ffff:192.168.1.2]", "0.0.0.0", True),
+        ("[::]", "192.0.2.2", False),
+        ("[::ffff:192.0.2.2]", "0.0.0.0", True),
         ("[::1]", "127.0.0.1", False),
     ],
 )
 def test_a_wildcard_takes_the_port_of_its_own_family_alone(first: str, second: str, *, clash: bool) -> None:
     """tests/links/modbus_server/test_listener.py opens both wildcards on one port."""
     texts = [
-        HEAD.replace("192.168.1.2:1502", f"{host}:1502").replace("press-3", cell).replace("1.10}", f"{end}}}")
+        HEAD.replace("192.0.2.2:1502", f"{host}:1502").replace("press-3", cell).replace("1.10}", f"{end}}}")
         for host, cell, end in ((first, "press-3", "1.10"), (second, "press-4", "1.11"))
     ]
     loaded = load_together([(f"{number}.yaml", text.encode()) for number, text in enumerate(texts)])
@@ -357,16 +357,16 @@ def test_a_wildcard_takes_the_port_of_its_own_family_alone(first: str, second: s
 @pytest.mark.parametrize(
     "listen, peer, reaches",
     [
-        ("192.168.1.2:502", "192.168.1.20", True),
-        ("192.168.1.2:502", "fd00::20", False),
-        ("192.168.1.2:502", "['fd00::20', 192.168.1.20]", True),
-        ("192.168.1.2:502", "'::ffff:192.168.1.20'", True),
-        ("192.168.1.2:502", "'::ffff:192.168.1.0/120'", True),
+        ("192.0.2.2:502", "192.0.2.20", True),
+        ("192.0.2.2:502", "fd00::20", False),
+        ("192.0.2.2:502", "['fd00::20', 192.0.2.20]", True),
+        ("192.0.2.2:502", "'::ffff:192.0.2.20'", True),
+        ("192.0.2.2:502", "'::ffff:192.0.2.0/120'", True),
         ("0.0.0.0:502", "fd00::/64", False),
         ("[::]:502", "fd00::/64", True),
-        ("[::]:502", "192.168.1.20", False),
+        ("[::]:502", "192.0.2.20", False),
         ("[::]:502", "'::/0'", True),
-        ("[::ffff:192.168.1.2]:502", "192.168.1.20", True),
+        ("[::ffff:192.0.2.2]:502", "192.0.2.20", True),
         ("127.0.0.1:502", "'::1'", False),
         ("127.0.0.1:502", "127.0.0.40", True),
         ("[::1]:502", "127.0.0.1", False),
@@ -374,8 +374,8 @@ def test_a_wildcard_takes_the_port_of_its_own_family_alone(first: str, second: s
         ("0.0.0.0:502", "0.0.0.0", False),
         ("0.0.0.0:502", "224.0.0.1", False),
         ("0.0.0.0:502", "255.255.255.255", False),
-        ("224.0.0.1:502", "192.168.1.20", False),
-        ("255.255.255.255:502", "192.168.1.20", False),
+        ("224.0.0.1:502", "192.0.2.20", False),
+        ("255.255.255.255:502", "192.0.2.20", False),
         ("[ff02::1]:502", "'fd00::20'", False),
         ("[fe80::1]:502", "'fe80::2'", False),
         ("[fe80::1%eth0]:502", "'fe80::2'", True),
@@ -383,7 +383,7 @@ def test_a_wildcard_takes_the_port_of_its_own_family_alone(first: str, second: s
 )
 def test_a_writer_that_can_never_connect_is_a_finding(listen: str, peer: str, *, reaches: bool) -> None:
     mapping = (
-        f"gatewayd: 1\ncell: press\nrobot: {{host: 192.168.1.10}}\nmodbus: {{listen: '{listen}'}}\n"
+        f"gatewayd: 1\ncell: press\nrobot: {{host: 192.0.2.10}}\nmodbus: {{listen: '{listen}'}}\n"
         f"writers:\n  plc:\n    modbus: {peer}\n    timeout: 1s\n"
         "variables:\n  go: {robot: input_bit_register_0, modbus: 0.0, owner: plc}\n"
     )
@@ -392,14 +392,14 @@ def test_a_writer_that_can_never_connect_is_a_finding(listen: str, peer: str, *,
 
 
 def test_an_access_list_that_lets_nobody_in_is_a_finding() -> None:
-    head = HEAD.replace("'192.168.1.2:1502'", "'[::]:1502', allow: [192.168.1.0/24]")
+    head = HEAD.replace("'192.0.2.2:1502'", "'[::]:1502', allow: [192.0.2.0/24]")
     found = load(head.encode(), "cell.yaml").diagnostics
     assert any("the access list lets nobody in" in finding.message for finding in found)
 
 
 def test_cells_on_different_ports_do_not_clash() -> None:
     """Nothing is shared, nothing is found."""
-    other = HEAD.replace("press-3", "press-4").replace("1.10}", "1.11}").replace("1502", "1503")
+    other = HEAD.replace("press-3", "press-4").replace("2.10}", "2.11}").replace("1502", "1503")
     loaded = load_together([("a.yaml", HEAD.encode()), ("b.yaml", other.encode())])
     assert [finding for one in loaded for finding in one.diagnostics] == []
 
@@ -420,11 +420,7 @@ def test_an_owner_of_an_output_is_told_the_input() -> None:
 @pytest.mark.parametrize("peer", ["127.0.0.1", "127.0.0.40", "0.0.0.0/0"])
 def test_writers_on_this_machine_reach_a_loopback_listener(peer: str) -> None:
     """So do networks that hold it."""
-    head = (
-        HEAD.replace("192.168.1.2:", "127.0.0.1:")
-        .replace("192.168.1.20", f"'{peer}'")
-        .replace("1.21", "1.22")
-    )
+    head = HEAD.replace("192.0.2.2:", "127.0.0.1:").replace("192.0.2.20", f"'{peer}'").replace("1.21", "1.22")
     found = load(head.encode(), "cell.yaml").diagnostics
     assert [
         (finding.rule.id, "`hmi`" in finding.message) for finding in found if finding.rule.id == "GW219"
@@ -505,7 +501,7 @@ def test_a_declared_field_of_an_older_controller_is_only_warned_of() -> None:
 CAN_HEAD = """\
 gatewayd: 1
 cell: press-3
-robot: {host: 192.168.1.10, series: e, frequency: 50}
+robot: {host: 192.0.2.10, series: e, frequency: 50}
 canopen:
   channel: can0
   bitrate: 1000000
@@ -630,9 +626,9 @@ def test_every_input_lies_where_an_owner_can_write(
         f", {key}: {value}" for key, value in (("canopen", canopen), ("modbus", modbus)) if value
     )
     found = on_can(
-        "modbus: {listen: '192.168.1.2:1502'}\n"
+        "modbus: {listen: '192.0.2.2:1502'}\n"
         "writers:\n"
-        "  plc: {modbus: 192.168.1.20, timeout: 1s}\n"
+        "  plc: {modbus: 192.0.2.20, timeout: 1s}\n"
         "  line: {canopen: rpdo, node: 1, heartbeat: 1s}\n"
         "  hmi: {canopen: sdo, node: 2, heartbeat: 1s}\n"
         "variables:\n"
@@ -678,9 +674,9 @@ PDO_MATES = {
 def test_what_is_mapped_in_one_rpdo_is_meant(first: str, second: str, rules: list[str]) -> None:
     """Bits too: while the PLC holds one of them, the whole PDO is refused."""
     found = on_can(
-        "modbus: {listen: '192.168.1.2:1502'}\n"
+        "modbus: {listen: '192.0.2.2:1502'}\n"
         "writers:\n"
-        "  plc: {modbus: 192.168.1.20, timeout: 1s}\n"
+        "  plc: {modbus: 192.0.2.20, timeout: 1s}\n"
         "  line: {canopen: rpdo, node: 1, heartbeat: 1s}\n"
         "groups: {g: {owner: [plc, line], lease: 2s}}\n"
         "variables:\n"
@@ -694,16 +690,16 @@ def test_what_is_mapped_in_one_rpdo_is_meant(first: str, second: str, rules: lis
 GROUP_HEAD = """\
 gatewayd: 1
 cell: press-3
-robot: {host: 192.168.1.10, series: e, frequency: 50}
-modbus: {listen: '192.168.1.2:1502'}
+robot: {host: 192.0.2.10, series: e, frequency: 50}
+modbus: {listen: '192.0.2.2:1502'}
 canopen:
   channel: can0
   bitrate: 500000
   node: 16
   pdos: {order: {variables: [recipe, batch]}}
 writers:
-  plc: {modbus: 192.168.1.20, timeout: 1s}
-  hmi: {modbus: 192.168.1.21, timeout: 1s}
+  plc: {modbus: 192.0.2.20, timeout: 1s}
+  hmi: {modbus: 192.0.2.21, timeout: 1s}
   line: {canopen: rpdo, node: 1, heartbeat: 1s}
   service: {canopen: sdo, node: 2, heartbeat: 1s}
 """
@@ -788,7 +784,7 @@ def test_bits_that_writing_their_register_does_not_take(
 
 def test_any_means_nobody_else_where_there_is_one_writer() -> None:
     """The default owner is no trap in a file with a single writer."""
-    head = HEAD.replace("  hmi: {modbus: 192.168.1.21, timeout: 1s}\n", "").replace("[plc, hmi]", "plc")
+    head = HEAD.replace("  hmi: {modbus: 192.0.2.21, timeout: 1s}\n", "").replace("[plc, hmi]", "plc")
     assert findings("  a: {robot: input_bit_register_0..7, modbus: 0.0}\n", head) == []
 
 
@@ -797,13 +793,13 @@ def test_a_family_of_shared_bits_is_one_finding() -> None:
 
 
 SUPERVISED = {
-    "no timeout": ("{modbus: 192.168.1.20}", "owner: plc", ["GW521"]),
-    "a timeout": ("{modbus: 192.168.1.20, timeout: 2s}", "owner: plc", []),
-    "a lease": ("{modbus: 192.168.1.20}", "owner: plc, lease: 2s", []),
+    "no timeout": ("{modbus: 192.0.2.20}", "owner: plc", ["GW521"]),
+    "a timeout": ("{modbus: 192.0.2.20, timeout: 2s}", "owner: plc", []),
+    "a lease": ("{modbus: 192.0.2.20}", "owner: plc, lease: 2s", []),
     "an RPDO master without a heartbeat": ("{canopen: any}", "owner: plc, canopen: auto", ["GW521"]),
     "a heartbeat": ("{canopen: any, node: 1, heartbeat: 1s}", "owner: plc, canopen: auto", []),
-    "reported by the rule about motion": ("{modbus: 192.168.1.20}", "owner: plc, name: go", ["GW604"]),
-    "reported by the rule about shared locks": ("{modbus: 192.168.1.20}", "owner: [plc, hmi], lease: none", ["GW514"]),
+    "reported by the rule about motion": ("{modbus: 192.0.2.20}", "owner: plc, name: go", ["GW604"]),
+    "reported by the rule about shared locks": ("{modbus: 192.0.2.20}", "owner: [plc, hmi], lease: none", ["GW514"]),
 }  # fmt: skip
 
 
@@ -811,10 +807,10 @@ SUPERVISED = {
 def test_a_writer_that_hangs_is_reported_once(writer: str, keys: str, rules: list[str]) -> None:
     keys, _, name = keys.partition(", name: ")
     text = (
-        "gatewayd: 1\ncell: c\nrobot: {host: 192.168.1.10, series: e, frequency: 50}\n"
-        "modbus: {listen: '192.168.1.2:1502'}\n"
+        "gatewayd: 1\ncell: c\nrobot: {host: 192.0.2.10, series: e, frequency: 50}\n"
+        "modbus: {listen: '192.0.2.2:1502'}\n"
         "canopen: {channel: can0, bitrate: 500000, node: 16}\n"
-        f"writers:\n  plc: {writer}\n  hmi: {{modbus: 192.168.1.21, timeout: 1s}}\n"
+        f"writers:\n  plc: {writer}\n  hmi: {{modbus: 192.0.2.21, timeout: 1s}}\n"
         "variables:\n"
         f"  {name or 'recipe'}: {{robot: input_int_register_0, modbus: 10, {keys}}}\n"
         "  call: {robot: input_int_register_1, modbus: 12, owner: hmi}\n"
@@ -852,10 +848,10 @@ def test_companions(value: str, companion: str, rules: list[str]) -> None:
 
 
 WITHOUT_EFFECT = {
-    "plc: {modbus: 192.168.1.20, timeout_counts: requests}": ["GW522"],
-    "plc: {modbus: 192.168.1.20, timeout: none, timeout_counts: writes}": ["GW522"],
-    "plc: {modbus: 192.168.1.20, timeout: 1s, timeout_counts: writes, grace: 1s}": [],
-    "plc: {modbus: 192.168.1.20, timeout: 1s, grace: 200ms}": [],
+    "plc: {modbus: 192.0.2.20, timeout_counts: requests}": ["GW522"],
+    "plc: {modbus: 192.0.2.20, timeout: none, timeout_counts: writes}": ["GW522"],
+    "plc: {modbus: 192.0.2.20, timeout: 1s, timeout_counts: writes, grace: 1s}": [],
+    "plc: {modbus: 192.0.2.20, timeout: 1s, grace: 200ms}": [],
     "plc: {canopen: sdo, node: 1, heartbeat: 1s, grace: 1s}": ["GW522"],
     "plc: {canopen: sdo, node: 1, heartbeat: 1s, grace: none}": [],
 }
@@ -863,7 +859,7 @@ WITHOUT_EFFECT = {
 
 @pytest.mark.parametrize("writer, rules", WITHOUT_EFFECT.items())
 def test_keys_of_writers_that_mean_nothing(writer: str, rules: list[str]) -> None:
-    head = HEAD.replace("plc: {modbus: 192.168.1.20, timeout: 1s}", writer)
+    head = HEAD.replace("plc: {modbus: 192.0.2.20, timeout: 1s}", writer)
     head = head.replace("writers:", "canopen: {channel: can0, bitrate: 500000, node: 16}\nwriters:")
     found = findings(
         "  a: {robot: input_int_register_0, modbus: 10, canopen: object, owner: plc, lease: 2s}\n", head
@@ -882,7 +878,7 @@ def test_keys_of_writers_that_mean_nothing(writer: str, rules: list[str]) -> Non
     ],
 )
 def test_keys_of_the_robot_that_mean_nothing(robot: str, rules: list[str]) -> None:
-    head = HEAD.replace("{host: 192.168.1.10}", f"{{host: 192.168.1.10, {robot}}}")
+    head = HEAD.replace("{host: 192.0.2.10}", f"{{host: 192.0.2.10, {robot}}}")
     assert [rule for rule, _ in findings("", head)] == rules
     more = "  a: {robot: output_int_register_0, modbus: 10}\n"
     assert [rule for rule, _ in findings(more, head)] == [rule for rule in rules if rule != "GW613"]
@@ -944,7 +940,7 @@ def test_a_misspelt_status_word_is_recognised() -> None:
 )
 def test_a_list_that_is_too_long_in_itself(rest: str, hint: str) -> None:
     """`verify: false` is no remedy for outputs."""
-    head = HEAD.replace("{host: 192.168.1.10}", "{host: 192.168.1.10, series: cb3}")
+    head = HEAD.replace("{host: 192.0.2.10}", "{host: 192.0.2.10, series: cb3}")
     lines = (
         "  a: {robot: output_double_register_0..47, modbus: 0}\n"
         "  b: {robot: output_int_register_0..47, modbus: 200}\n"
@@ -955,7 +951,7 @@ def test_a_list_that_is_too_long_in_itself(rest: str, hint: str) -> None:
 
 def test_read_backs_make_the_list_too_long() -> None:
     """Without them it fits: that is what `verify: false` does."""
-    head = HEAD.replace("{host: 192.168.1.10}", "{host: 192.168.1.10, series: cb3}")
+    head = HEAD.replace("{host: 192.0.2.10}", "{host: 192.0.2.10, series: cb3}")
     lines = (
         "  a: {robot: output_double_register_0..47, modbus: 0}\n"
         "  b: {robot: input_double_register_0..47, modbus: 500, owner: plc}\n"

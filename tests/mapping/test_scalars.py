@@ -81,14 +81,14 @@ def test_refused_listen_addresses(text: str, slug: str) -> None:
 
 
 def test_networks() -> None:
-    networks = read(scalars.Networks, "[192.168.1.20, 10.0.0.0/8, 'fe80::/64']")
-    assert [str(network) for network in networks] == ["192.168.1.20/32", "10.0.0.0/8", "fe80::/64"]
-    assert len(read(scalars.Networks, "192.168.1.20")) == 1
+    networks = read(scalars.Networks, "[192.0.2.20, 198.51.100.0/24, 'fe80::/64']")
+    assert [str(network) for network in networks] == ["192.0.2.20/32", "198.51.100.0/24", "fe80::/64"]
+    assert len(read(scalars.Networks, "192.0.2.20")) == 1
 
 
 @pytest.mark.parametrize(
     "text, hint",
-    [("192.168.1.5/24", "192.168.1.0/24"), ("plc", "write an address"), ("[]", "name at least one")],
+    [("192.0.2.5/24", "192.0.2.0/24"), ("plc", "write an address"), ("[]", "name at least one")],
 )
 def test_refused_networks(text: str, hint: str) -> None:
     assert hint in refused(scalars.Networks, text)[2]

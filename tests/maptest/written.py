@@ -9,13 +9,13 @@ from gatewayd.maptest.run import FileOutcome, run_file
 MAPPING = """\
 gatewayd: 1
 cell: press-3
-robot: {host: 192.168.1.10, stale_after: 200ms, adopt_for: 5s}
-modbus: {listen: '192.168.1.2:1502'}
+robot: {host: 192.0.2.10, stale_after: 200ms, adopt_for: 5s}
+modbus: {listen: '192.0.2.2:1502'}
 canopen: {channel: can0, bitrate: 500000, node: 16, heartbeat: 500ms}
 writers:
-  plc: {modbus: 192.168.1.20, timeout: 2s}
-  hmi: {modbus: 192.168.1.21, timeout: 2s, grace: 1s}
-  panel: {modbus: 192.168.1.22}
+  plc: {modbus: 192.0.2.20, timeout: 2s}
+  hmi: {modbus: 192.0.2.21, timeout: 2s, grace: 1s}
+  panel: {modbus: 192.0.2.22}
   line: {canopen: any, node: 1, heartbeat: 1s}
 groups:
   motion: {owner: [plc, hmi], lease: 1.5s, whole: true}

@@ -50,8 +50,8 @@ def cell() -> Cell:
             "an undeclared peer wrote an address: refused, no variable at this address",
         ),
         (
-            Event(0, EventKind.REFUSED, LIMIT, 1, reason=Reason.NOT_WRITABLE, new=5.0, peer="192.168.1.77"),
-            "undeclared peer 192.168.1.77 wrote limit = 5 N: refused, never writable by this writer",
+            Event(0, EventKind.REFUSED, LIMIT, 1, reason=Reason.NOT_WRITABLE, new=5.0, peer="192.0.2.77"),
+            "undeclared peer 192.0.2.77 wrote limit = 5 N: refused, never writable by this writer",
         ),
         (Event(0, EventKind.FALLBACK, LIMIT, old=5.0, new=0.0), "limit fell back from 5 to 0 N"),
         (Event(0, EventKind.ACQUIRED, lock=START, writer=PLC), "plc took start"),

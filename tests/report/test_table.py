@@ -32,11 +32,11 @@ from gatewayd.report.table import (
 TEXT = """\
 gatewayd: 1
 cell: press-3
-robot: {host: 192.168.1.10}
-modbus: {listen: '192.168.1.2:1502', unit: 3}
+robot: {host: 192.0.2.10}
+modbus: {listen: '192.0.2.2:1502', unit: 3}
 writers:
-  plc: {modbus: 192.168.1.20, timeout: 1s}
-  hmi: {modbus: 192.168.1.21, timeout: 1s}
+  plc: {modbus: 192.0.2.20, timeout: 1s}
+  hmi: {modbus: 192.0.2.21, timeout: 1s}
 groups:
   motion: {owner: [plc, hmi], lease: 2s}
 variables:
@@ -125,7 +125,7 @@ def test_csv_reads_back(loaded: Loaded) -> None:
 def test_json_is_complete(loaded: Loaded, plan: Plan) -> None:
     document = json.loads(as_json(plan, loaded.cell, rows(loaded.cell)))
     assert (document["version"], document["cell"]) == (1, "press-3")
-    assert document["modbus"] == {"host": "192.168.1.2", "port": 1502, "unit": 3}
+    assert document["modbus"] == {"host": "192.0.2.2", "port": 1502, "unit": 3}
     assert int(document["fingerprint"], 16) == plan.cell.fingerprint
     assert set(document["variables"][0]) == set(columns())
 
@@ -155,7 +155,7 @@ def test_a_variable_without_a_place_has_a_row() -> None:
 
 def test_new_keys_have_columns_and_words() -> None:
     """A whole group, and outputs that hang on the robot program."""
-    text = TEXT.replace("{host: 192.168.1.10}", "{host: 192.168.1.10, valid: running}")
+    text = TEXT.replace("{host: 192.0.2.10}", "{host: 192.0.2.10, valid: running}")
     text = text.replace("lease: 2s}", "lease: 2s, whole: true}") + (
         "  answer: {robot: output_int_register_0, modbus: 110, on_stale: hold}\n"
     )

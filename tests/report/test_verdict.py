@@ -14,7 +14,7 @@ from gatewayd.mapping.loader import load
 from gatewayd.report.verdict import PRESENT, RECENT, CellVerdict, PicturePart, gateway_part, judge
 from tests.web.press import CYCLES, FORCE_LIMIT, HMI, LINE, MAPPING, PLC, SPARE, START
 
-ADDRESS = "10.0.0.1:30004"
+ADDRESS = "192.0.2.1:30004"
 NOW = 10.0
 
 

@@ -50,8 +50,8 @@ def test_what_differs_in_who_what_or_from_where_is_not_merged(
         record(0.0, variable="limit"),
         record(0.0, writer="hmi"),
         record(0.0, reason="held by another owner"),
-        record(0.0, peer="192.168.1.30:50000"),
-        record(0.0, peer="192.168.1.31:50000"),
+        record(0.0, peer="192.0.2.30:50000"),
+        record(0.0, peer="192.0.2.31:50000"),
         replace(record(0.0), cell="weld"),
     ):
         before = len(kept)

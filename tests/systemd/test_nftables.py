@@ -48,7 +48,7 @@ def missing() -> str:
 
 @pytest.mark.skipif(bool(missing()), reason=missing())
 def test_the_service_reaches_nothing_of_a_robot_but_rtde(tmp_path: Path) -> None:
-    rules = SAMPLE.read_text().replace("elements = { 192.168.1.10 }", "elements = { 127.0.0.2 }")
+    rules = SAMPLE.read_text().replace("elements = { 192.0.2.10 }", "elements = { 127.0.0.2 }")
     rules = rules.replace("meta skuid != gatewayd", f"meta skuid != {SERVICE}")
     (tmp_path / "rules.nft").write_text(rules)
     (tmp_path / "probe.py").write_text(PROBE)

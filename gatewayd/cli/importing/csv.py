@@ -29,10 +29,10 @@ _WRITER = re.compile(r"(?:(?P<name>[A-Za-z][A-Za-z0-9_]{0,63})=)?(?P<address>[0-
     name="csv",
     epilog="""\b
 Examples:
-  gatewayd import csv registers.csv --host 192.168.1.10 --writer 192.168.1.20 -o press.yaml
-  gatewayd import csv liste.csv --host 192.168.1.10 --addresses from-1       to standard output
+  gatewayd import csv registers.csv --host 192.0.2.10 --writer 192.0.2.20 -o press.yaml
+  gatewayd import csv liste.csv --host 192.0.2.10 --addresses from-1         to standard output
   gatewayd show --format csv press.yaml > list.csv                           a list to begin with
-  gatewayd import csv list.csv --host 192.168.1.10 --writer plc=192.168.1.20 --writer hmi=192.168.1.21
+  gatewayd import csv list.csv --host 192.0.2.10 --writer plc=192.0.2.20 --writer hmi=192.0.2.21
 
 \b
 Exit codes:

@@ -30,9 +30,9 @@ _NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
     name="eds",
     epilog="""\b
 Examples:
-  gatewayd import eds encoder.eds --host 192.168.1.10 --node 5                 to standard output
-  gatewayd import eds island.eds --host 192.168.1.10 --node 7 --bus can1 -o press.yaml
-  gatewayd import eds drive.dcf --host 192.168.1.10 --node 3 --device drive --leave-out -o press.yaml
+  gatewayd import eds encoder.eds --host 192.0.2.10 --node 5                 to standard output
+  gatewayd import eds island.eds --host 192.0.2.10 --node 7 --bus can1 -o press.yaml
+  gatewayd import eds drive.dcf --host 192.0.2.10 --node 3 --device drive --leave-out -o press.yaml
 
 \b
 Exit codes:

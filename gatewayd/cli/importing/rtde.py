@@ -25,10 +25,10 @@ FOUND, WRONG = 1, 2
     name="rtde",
     epilog="""\b
 Examples:
-  gatewayd import rtde record_configuration.xml --host 192.168.1.10 -o press.yaml
-  gatewayd import rtde control_loop_configuration.xml --host 192.168.1.10 --writer 192.168.1.20 -o press.yaml
+  gatewayd import rtde record_configuration.xml --host 192.0.2.10 -o press.yaml
+  gatewayd import rtde control_loop_configuration.xml --host 192.0.2.10 --writer 192.0.2.20 -o press.yaml
   gatewayd import rtde rtde_output_recipe.txt --host robot.local              to standard output
-  gatewayd import rtde --recipe out configuration.xml --host 192.168.1.10    one recipe of several
+  gatewayd import rtde --recipe out configuration.xml --host 192.0.2.10      one recipe of several
 
 \b
 Exit codes:

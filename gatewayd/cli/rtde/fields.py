@@ -26,9 +26,9 @@ NOT_ALL = 1
 Examples:
   gatewayd rtde fields                                  every field that is known of
   gatewayd rtde fields --series e --version 5.12        those that this software should have
-  gatewayd rtde fields 192.168.1.10                     those that this controller says it has
-  gatewayd rtde fields 192.168.1.10 --ask dexterity     a name that is newer than the catalogue, too
-  gatewayd rtde fields 192.168.1.10 --probe-claims      inputs as well, and which are in use
+  gatewayd rtde fields 192.0.2.10                       those that this controller says it has
+  gatewayd rtde fields 192.0.2.10 --ask dexterity       a name that is newer than the catalogue, too
+  gatewayd rtde fields 192.0.2.10 --probe-claims        inputs as well, and which are in use
   gatewayd rtde fields --format csv > fields.csv        one line for each register
 
 \b

@@ -19,9 +19,9 @@ _PATIENCE = 3.0
     name="get",
     epilog="""\b
 Examples:
-  gatewayd rtde get 192.168.1.10 runtime_state safety_mode actual_TCP_pose
-  gatewayd rtde get 192.168.1.10 input_int_register_24        what an input holds; nothing is claimed
-  gatewayd rtde get 192.168.1.10 --json actual_q | jq .values.actual_q[5]
+  gatewayd rtde get 192.0.2.10 runtime_state safety_mode actual_TCP_pose
+  gatewayd rtde get 192.0.2.10 input_int_register_24        what an input holds; nothing is claimed
+  gatewayd rtde get 192.0.2.10 --json actual_q | jq .values.actual_q[5]
 
 \b
 Exit codes:

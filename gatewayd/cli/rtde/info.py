@@ -23,9 +23,9 @@ _LEAST, _MOST = 0.1, 60.0
     name="info",
     epilog="""\b
 Examples:
-  gatewayd rtde info 192.168.1.10
+  gatewayd rtde info 192.0.2.10
   gatewayd rtde info --seconds 10 robot.local     measure the rate for longer
-  gatewayd rtde info --json 192.168.1.10 | jq .software
+  gatewayd rtde info --json 192.0.2.10 | jq .software
 
 \b
 Exit codes:

@@ -13,8 +13,8 @@ _LEVELS = ("info", "warning", "error", "exception")
     name="message",
     epilog="""\b
 Examples:
-  gatewayd rtde message 192.168.1.10 'gripper changed by anna'
-  gatewayd rtde message 192.168.1.10 'test run 7 begins' --level warning --source 'line 3'
+  gatewayd rtde message 192.0.2.10 'gripper changed by anna'
+  gatewayd rtde message 192.0.2.10 'test run 7 begins' --level warning --source 'line 3'
 
 \b
 Exit codes:

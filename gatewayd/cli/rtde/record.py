@@ -51,11 +51,11 @@ Conditions:
 
 \b
 Examples:
-  gatewayd rtde record 192.168.1.10                              what people usually want, until Ctrl-C
-  gatewayd rtde record 192.168.1.10 run.csv --fields actual_q,actual_TCP_force --frequency 125
-  gatewayd rtde record 192.168.1.10 run.csv --config record_configuration.xml --key out
-  gatewayd rtde record 192.168.1.10 run.csv --while 'runtime_state == 2' --before 1s --after 2s
-  gatewayd rtde record 192.168.1.10 stop.csv --stop 'safety_mode != 1' --after 5s --reconnect
+  gatewayd rtde record 192.0.2.10                              what people usually want, until Ctrl-C
+  gatewayd rtde record 192.0.2.10 run.csv --fields actual_q,actual_TCP_force --frequency 125
+  gatewayd rtde record 192.0.2.10 run.csv --config record_configuration.xml --key out
+  gatewayd rtde record 192.0.2.10 run.csv --while 'runtime_state == 2' --before 1s --after 2s
+  gatewayd rtde record 192.0.2.10 stop.csv --stop 'safety_mode != 1' --after 5s --reconnect
   gatewayd rtde record --gateway press.csv --duration 10min      by the running gateway's connection
 
 \b

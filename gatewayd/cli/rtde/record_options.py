@@ -72,6 +72,6 @@ def fields_of(names: tuple[str, ...], config: str | None, key: str | None) -> Fi
 
 
 def default_name(host: str, *, binary: bool) -> str:
-    """`rtde-192.168.1.10-20261129-141500.csv`, in the present directory."""
+    """`rtde-192.0.2.10-20261129-141500.csv`, in the present directory."""
     safe = "".join(letter if letter.isalnum() or letter in ".-_" else "-" for letter in host)
     return f"rtde-{safe}-{time.strftime('%Y%m%d-%H%M%S')}{'.bin' if binary else '.csv'}"

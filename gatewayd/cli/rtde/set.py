@@ -33,8 +33,8 @@ What can be set:
 
 \b
 Examples:
-  gatewayd rtde set 192.168.1.10 input_int_register_24=7 input_bit_register_70=on
-  gatewayd rtde set 192.168.1.10 standard_digital_output_3=off --while-running
+  gatewayd rtde set 192.0.2.10 input_int_register_24=7 input_bit_register_70=on
+  gatewayd rtde set 192.0.2.10 standard_digital_output_3=off --while-running
 
 \b
 Exit codes:

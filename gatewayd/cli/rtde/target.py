@@ -14,7 +14,7 @@ Target = tuple[str, int]
 
 
 class TargetType(click.ParamType):  # type: ignore[type-arg]
-    """`192.168.1.10`, `robot.local:30004`, `::1`, `[::1]:30004`; the port is RTDE's where none is named."""
+    """`192.0.2.10`, `robot.local:30004`, `::1`, `[::1]:30004`; the port is RTDE's where none is named."""
 
     name = "host"
 

@@ -30,9 +30,9 @@ Keys:
 
 \b
 Examples:
-  gatewayd rtde watch 192.168.1.10                          what people usually want to see
-  gatewayd rtde watch 192.168.1.10 runtime_state actual_TCP_pose output_int_register_0
-  gatewayd rtde watch 192.168.1.10 actual_q --interval 2s | tee log.txt
+  gatewayd rtde watch 192.0.2.10                          what people usually want to see
+  gatewayd rtde watch 192.0.2.10 runtime_state actual_TCP_pose output_int_register_0
+  gatewayd rtde watch 192.0.2.10 actual_q --interval 2s | tee log.txt
 
 \b
 Exit codes:

@@ -43,7 +43,7 @@ class DeviceAddress:
 def _target(value: object) -> DeviceAddress:
     if isinstance(value, DeviceAddress):
         return value
-    hint = "write host:port, for example 192.168.1.30:502 or island.local; without a port it is 502"
+    hint = "write host:port, for example 192.0.2.30:502 or island.local; without a port it is 502"
     text = scalar(value, "the address of a device", hint)
     match = _TARGET.fullmatch(text)
     if match is None:
@@ -65,7 +65,7 @@ def _target(value: object) -> DeviceAddress:
 Target = Annotated[
     InstanceOf[DeviceAddress],
     BeforeValidator(
-        _target, json_schema_input_type=Annotated[str, Field(examples=["192.168.1.30:502", "island.local"])]
+        _target, json_schema_input_type=Annotated[str, Field(examples=["192.0.2.30:502", "island.local"])]
     ),
 ]
 """Host and port of a device."""

@@ -52,7 +52,7 @@ class DeviceSpec(DeviceKeys, ModbusDeviceKeys, CanopenDeviceKeys):
         if len(given) != 1:
             found = "none" if not given else " and ".join(given)
             message = f"a device has exactly one of {', '.join(DEVICE_SELECTORS)}; found {found}"
-            refuse(syntax.MISSING_KEY, message, "write for example {modbus: 192.168.1.30:502, unit: 1}")
+            refuse(syntax.MISSING_KEY, message, "write for example {modbus: 192.0.2.30:502, unit: 1}")
         is_rtu = self.serial is not None or self.framing == "rtu"
         if is_rtu and not 1 <= self.unit <= MAX_UNIT_OF_LINE:
             refuse(

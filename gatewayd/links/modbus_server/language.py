@@ -60,7 +60,7 @@ class ModbusLanguage(LinkLanguage):
     }
     synonyms: ClassVar[Mapping[tuple[str, str], str]] = TYPE_SYNONYMS
     way = "Modbus"
-    writer_example = "modbus: 192.168.1.20"
+    writer_example = "modbus: 192.0.2.20"
     place_example = "modbus: N"
 
     def knows(self, writer: WriterSpec) -> bool:

@@ -154,7 +154,7 @@ def test_whatever_is_carried_passes_the_check(drawn: list[list[Field]], single: 
         assert _errors(mapping_text(fields, _single() if single else SETTINGS, "x")) == []
 
 
-@pytest.mark.parametrize("host", ["192.168.1.10", "robot.local", "fe80::1%eth0", "::1"])
+@pytest.mark.parametrize("host", ["192.0.2.10", "robot.local", "fe80::1%eth0", "::1"])
 def test_hosts_are_written_as_yaml_takes_them(host: str) -> None:
     fields, _ = imported([recipe("out", "timestamp")])
     loaded = load(mapping_text(fields, ImportSettings("1e3", host, "[::1]:1502"), 'a"b').encode(), "x")

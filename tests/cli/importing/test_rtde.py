@@ -66,8 +66,8 @@ def test_inputs_want_a_writer(recipe: Path) -> None:
 
 def test_a_writer_on_another_machine_is_listened_to(recipe: Path) -> None:
     assert (
-        "listen: 0.0.0.0:502\n  allow: [192.168.1.20]"
-        in import_rtde(recipe, "--host", "127.0.0.9", "--writer", "192.168.1.20").stdout
+        "listen: 0.0.0.0:502\n  allow: [192.0.2.20]"
+        in import_rtde(recipe, "--host", "127.0.0.9", "--writer", "192.0.2.20").stdout
     )
 
 
@@ -89,9 +89,9 @@ def test_nothing_is_half_imported_unless_it_is_asked_for(tmp_path: Path) -> None
 
 def test_what_the_check_would_refuse_is_not_written(recipe: Path, tmp_path: Path) -> None:
     out = tmp_path / "cell.yaml"
-    done = import_rtde(recipe, "--host", "192.168.1.300", "--writer", "127.0.0.1", "-o", out)
+    done = import_rtde(recipe, "--host", "192.0.2.300", "--writer", "127.0.0.1", "-o", out)
     assert done.exit_code == 1
-    assert "`192.168.1.300` is not an IP address" in done.stderr
+    assert "`192.0.2.300` is not an IP address" in done.stderr
     assert not out.exists()
 
 

@@ -4,7 +4,7 @@ from rich.console import Console
 
 from gatewayd.cli.rtde.robot_picture import RobotGlimpse, picture, plain
 
-FRESH = RobotGlimpse("10.0.0.5:30004", {"runtime_state": 2, "timestamp": 7.5}, 7.5, 499.6, 3)
+FRESH = RobotGlimpse("192.0.2.5:30004", {"runtime_state": 2, "timestamp": 7.5}, 7.5, 499.6, 3)
 
 
 def drawn(glimpse: RobotGlimpse, before: RobotGlimpse | None = None, height: int = 30) -> str:
@@ -16,7 +16,7 @@ def drawn(glimpse: RobotGlimpse, before: RobotGlimpse | None = None, height: int
 
 def test_lines_begin_with_who_and_how_fast() -> None:
     assert plain(FRESH) == [
-        "10.0.0.5:30004  7.500 s  500 Hz, 3 skipped",
+        "192.0.2.5:30004  7.500 s  500 Hz, 3 skipped",
         "  runtime_state  2  (running)",
         "  timestamp      7.5  s",
         "",
@@ -24,13 +24,13 @@ def test_lines_begin_with_who_and_how_fast() -> None:
 
 
 def test_a_rate_that_was_not_measured_yet_is_not_shown_as_zero() -> None:
-    new = RobotGlimpse("10.0.0.5:30004", FRESH.values, 7.5)
-    assert plain(new)[0] == "10.0.0.5:30004  7.500 s  measuring the rate, none skipped"
+    new = RobotGlimpse("192.0.2.5:30004", FRESH.values, 7.5)
+    assert plain(new)[0] == "192.0.2.5:30004  7.500 s  measuring the rate, none skipped"
 
 
 def test_what_is_old_says_so() -> None:
-    old = RobotGlimpse("10.0.0.5:30004", FRESH.values, lost="connection refused\x1b[2J")
-    assert plain(old)[0] == "10.0.0.5:30004: everything below is old: connection refused\\x1b[2J"
+    old = RobotGlimpse("192.0.2.5:30004", FRESH.values, lost="connection refused\x1b[2J")
+    assert plain(old)[0] == "192.0.2.5:30004: everything below is old: connection refused\\x1b[2J"
     assert "everything below is old" in drawn(old)
     assert "\x1b[2J" not in drawn(old)
 

@@ -15,7 +15,7 @@ from gatewayd.mapping.loader import load_together
 FULL = """\
 gatewayd: 1
 cell: full
-robot: {{host: 192.168.1.10, series: e, frequency: {frequency}}}
+robot: {{host: 192.0.2.10, series: e, frequency: {frequency}}}
 canopen:
   channel: can0
   bitrate: 1000000
@@ -103,7 +103,7 @@ def test_the_full_image_as_it_is_known(frequency: int, real: str, share: float) 
 ONE = """\
 gatewayd: 1
 cell: one
-robot: {{host: 192.168.1.10, series: e, frequency: 125}}
+robot: {{host: 192.0.2.10, series: e, frequency: 125}}
 canopen:
   channel: can0
   bitrate: 500000

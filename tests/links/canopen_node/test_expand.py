@@ -15,7 +15,7 @@ from gatewayd.mapping.source import parse
 HEAD = """\
 gatewayd: 1
 cell: press-3
-robot: {host: 192.168.1.10}
+robot: {host: 192.0.2.10}
 writers:
   line: {canopen: any}
 canopen:

@@ -17,7 +17,7 @@ robot: {host: r}
 canopen: {channel: can0, bitrate: 500000, node: 16, pdos: {p: {variables: [a, b]}}}
 writers:
   line: {canopen: any, node: 1, heartbeat: 1s}
-  plc: {modbus: 10.0.0.1}
+  plc: {modbus: 192.0.2.1}
 variables:
   a: {robot: input_int_register_0}
   b: {robot: input_bit_register_0}

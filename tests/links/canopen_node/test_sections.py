@@ -123,7 +123,7 @@ def test_other_places_are_refused(text: str) -> None:
     "text, slugs",
     [
         ("{canopen: rpdo}", []),
-        ("{canopen: any, modbus: 10.0.0.1, node: 1, heartbeat: 1s}", []),
+        ("{canopen: any, modbus: 192.0.2.1, node: 1, heartbeat: 1s}", []),
         ("{timeout: 1s}", ["missing-key"]),
         ("{canopen: pdo}", ["bad-choice"]),
         ("{canopen: rpdo, node: 0}", ["out-of-range"]),
@@ -138,7 +138,7 @@ def test_supervision_of_a_writer() -> None:
     """A heartbeat says something of the CANopen side alone."""
     writers = read(
         "writers: {a: {canopen: rpdo}, b: {canopen: rpdo, node: 1, heartbeat: 1s}, c: {canopen: any, timeout: 1s},"
-        " d: {canopen: sdo, modbus: 10.0.0.1, node: 1, heartbeat: 1s}}"
+        " d: {canopen: sdo, modbus: 192.0.2.1, node: 1, heartbeat: 1s}}"
     )[0].writers
     assert {name: is_supervised(part.spec) for name, part in writers.items()} == {
         "a": False,

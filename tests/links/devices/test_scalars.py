@@ -11,8 +11,8 @@ from tests.mapping.values import read, refused
 @pytest.mark.parametrize(
     "text, shown",
     [
-        ("192.168.1.30:502", "192.168.1.30:502"),
-        ("192.168.1.30", "192.168.1.30:502"),
+        ("192.0.2.30:502", "192.0.2.30:502"),
+        ("192.0.2.30", "192.0.2.30:502"),
         ("island.local:1502", "island.local:1502"),
         ("'[fe80::1]:502'", "[fe80::1]:502"),
         ("'[::1]'", "[::1]:502"),
@@ -25,7 +25,7 @@ def test_addresses(text: str, shown: str) -> None:
 @pytest.mark.parametrize(
     "text, rule",
     [
-        ("192.168.1.300:502", "bad-network-address"),
+        ("192.0.2.300:502", "bad-network-address"),
         ("'island:70000'", "out-of-range"),
         ("'island:0'", "out-of-range"),
         ("'a b'", "bad-network-address"),

@@ -20,7 +20,7 @@ from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
 
 from .conftest import NOW, PLC
 
-HERE = ip_address("10.0.0.1")
+HERE = ip_address("192.0.2.1")
 
 
 @pytest.mark.parametrize(
@@ -74,11 +74,11 @@ def test_a_cell_that_goes_loses_more_than_them_unless_another_robot_would_answer
 
 
 def test_it_hangs_on_what_a_client_may_reach(named: Callable[..., NamedPlan]) -> None:
-    a, b = named("a", "10.0.0.0/24"), named("b", "10.0.1.0/24")
+    a, b = named("a", "192.0.2.0/24"), named("b", "198.51.100.0/24")
     assert lost([a], [a, b], ()) == {}
     assert lost([a], [a, named("b")], ()) == {"a": None}
-    assert lost([a, b], [a, b, named("c", "10.0.1.7")], [HERE]) == {"b": None}
-    assert lost([a, b], [a, named("b", "10.0.0.0/23")], [HERE]) == {"a": None}
+    assert lost([a, b], [a, b, named("c", "198.51.100.7")], [HERE]) == {"b": None}
+    assert lost([a, b], [a, named("b", "192.0.2.0/23")], [HERE]) == {"a": None}
     assert lost([named("a")], [a], ()) == {}, "who may not connect any more is another matter"
 
 
@@ -88,7 +88,7 @@ def test_the_objection_names_what_owners_would_lose(cell: Cell, index_of: Callab
     assert weaker.text == (
         "clients that ask for the unit ids 0 and 255 would find nobody; `default_unit: true` keeps them"
     )
-    plc = Requester(PLC, "10.0.0.1", 7)
+    plc = Requester(PLC, "192.0.2.1", 7)
     cell.writer_connected(plc, NOW)
     assert losing(cell, "b", [plc]).kind is ObjectionKind.WEAKENING, "nothing is owned"
     assert cell.write(plc, [Change(index_of("part"), 1)], NOW) is None

@@ -10,7 +10,7 @@ from gatewayd.mapping.loader import load
 def cell(*lines: str) -> ExpandedCell:
     text = (
         "gatewayd: 1\ncell: c\nrobot: {host: r}\n"
-        "writers: {plc: {modbus: [10.0.0.1, 10.1.0.0/16]}, line: {canopen: rpdo}}\nvariables:\n"
+        "writers: {plc: {modbus: [192.0.2.1, 198.51.100.0/24]}, line: {canopen: rpdo}}\nvariables:\n"
     )
     return load((text + "".join(f"  {line}\n" for line in lines)).encode(), "f").cell
 
@@ -18,7 +18,7 @@ def cell(*lines: str) -> ExpandedCell:
 def test_writers_have_addresses() -> None:
     plc, line = (part.spec for part in cell().document.writers.values())
     assert (LANGUAGE.knows(plc), LANGUAGE.knows(line)) == (True, False)
-    assert LANGUAGE.names(plc) == ["10.0.0.1", "10.1.0.0/16"]
+    assert LANGUAGE.names(plc) == ["192.0.2.1", "198.51.100.0/24"]
     assert (LANGUAGE.ways_of_writer(plc), LANGUAGE.ways_of_writer(line)) == (
         frozenset({"Modbus"}),
         frozenset(),

@@ -24,8 +24,8 @@ FULL = PeerEventKind.FULL
 @pytest.mark.parametrize(
     "host,address",
     [
-        ("192.168.1.20", "192.168.1.20"),
-        ("::ffff:192.168.1.20", "192.168.1.20"),
+        ("192.0.2.20", "192.0.2.20"),
+        ("::ffff:192.0.2.20", "192.0.2.20"),
         ("::1", "::1"),
         ("fe80::1%eth0", "fe80::1"),
     ],
@@ -36,13 +36,13 @@ def test_address_of_a_peer(host: str, address: str) -> None:
 
 def test_the_first_network_that_has_the_peer_names_the_writer() -> None:
     """The plan has the most specific one first."""
-    writers = ((ip_network("10.0.0.7/32"), 3), (ip_network("fd00::/8"), 4), (ip_network("10.0.0.0/24"), 5))
-    assert writer_of(ip_address("10.0.0.7"), writers) == 3
-    assert writer_of(ip_address("10.0.0.8"), writers) == 5
+    writers = ((ip_network("192.0.2.7/32"), 3), (ip_network("fd00::/8"), 4), (ip_network("192.0.2.0/24"), 5))
+    assert writer_of(ip_address("192.0.2.7"), writers) == 3
+    assert writer_of(ip_address("192.0.2.8"), writers) == 5
     assert writer_of(ip_address("fd00::1"), writers) == 4
-    assert writer_of(ip_address("10.0.1.7"), writers) is None
-    assert network_of(ip_address("10.0.0.8"), writers) == ip_network("10.0.0.0/24")
-    assert network_of(ip_address("10.0.1.7"), writers) is None
+    assert writer_of(ip_address("198.51.100.7"), writers) is None
+    assert network_of(ip_address("192.0.2.8"), writers) == ip_network("192.0.2.0/24")
+    assert network_of(ip_address("198.51.100.7"), writers) is None
 
 
 def test_without_an_access_list_everybody_may_connect(plan_of: Callable[..., ModbusPlan]) -> None:
@@ -50,30 +50,30 @@ def test_without_an_access_list_everybody_may_connect(plan_of: Callable[..., Mod
 
 
 def test_an_access_list_names_who_may(plan_of: Callable[..., ModbusPlan]) -> None:
-    plan = plan_of(allow=("10.0.0.0/24", "fd00::/8"))
-    assert may_connect(ip_address("10.0.0.9"), plan)
+    plan = plan_of(allow=("192.0.2.0/24", "fd00::/8"))
+    assert may_connect(ip_address("192.0.2.9"), plan)
     assert may_connect(ip_address("fd00::9"), plan)
-    assert not may_connect(ip_address("10.0.1.9"), plan)
+    assert not may_connect(ip_address("198.51.100.9"), plan)
     assert not may_connect(ip_address("fe80::9"), plan)
 
 
 def test_a_peer_that_knocks_all_the_time_is_reported_once_a_minute_with_the_number() -> None:
     log = PeerLog(60.0)
-    assert log.reports("10.0.0.9", FULL, 0.0)
-    assert not any(log.reports("10.0.0.9", FULL, 0.5 * number) for number in range(1, 100))
-    assert log.reports("10.0.0.9", PeerEventKind.DENIED, 50.0), "another reason"
-    assert log.reports("10.0.0.8", FULL, 59.0), "another peer"
+    assert log.reports("192.0.2.9", FULL, 0.0)
+    assert not any(log.reports("192.0.2.9", FULL, 0.5 * number) for number in range(1, 100))
+    assert log.reports("192.0.2.9", PeerEventKind.DENIED, 50.0), "another reason"
+    assert log.reports("192.0.2.8", FULL, 59.0), "another peer"
     assert list(log.kept_back(59.9)) == []
-    assert list(log.kept_back(60.0)) == [PeerEvent(FULL, "10.0.0.9", repeats=99)]
-    assert log.reports("10.0.0.9", FULL, 60.1)
+    assert list(log.kept_back(60.0)) == [PeerEvent(FULL, "192.0.2.9", repeats=99)]
+    assert log.reports("192.0.2.9", FULL, 60.1)
     assert list(log.kept_back(math.inf)) == [], "nothing was kept back of the others"
 
 
 def test_a_peer_that_comes_and_goes_is_reported_ten_times_a_minute() -> None:
     log = PeerLog(60.0)
-    reported = [log.reports("10.0.0.9", PeerEventKind.CONNECTED, 0.1 * number) for number in range(100)]
+    reported = [log.reports("192.0.2.9", PeerEventKind.CONNECTED, 0.1 * number) for number in range(100)]
     assert reported == [True] * 10 + [False] * 90
-    assert list(log.kept_back(60.0)) == [PeerEvent(PeerEventKind.CONNECTED, "10.0.0.9", repeats=90)]
+    assert list(log.kept_back(60.0)) == [PeerEvent(PeerEventKind.CONNECTED, "192.0.2.9", repeats=90)]
 
 
 def test_a_thousand_addresses_take_no_more_room_and_lines_than_a_few() -> None:

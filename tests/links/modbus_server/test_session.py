@@ -45,24 +45,24 @@ def session(unit: Unit) -> ModbusSession:
 def test_a_refused_undeclared_peer_is_named_by_its_address(cell: Cell, unit: Unit, pdu: str) -> None:
     """Whoever mends the mapping has to know what to write under `writers:`."""
     session = ModbusSession()
-    session.serve({1: UnitAccess(unit, Requester(None, "192.168.1.77"))})
+    session.serve({1: UnitAccess(unit, Requester(None, "192.0.2.77"))})
     feed(session, stream(pdu))
     assert cell.last_refusal is not None
-    assert cell.last_refusal.peer == "192.168.1.77"
-    assert [event.peer for event in cell.events if event.kind is EventKind.REFUSED] == ["192.168.1.77"]
+    assert cell.last_refusal.peer == "192.0.2.77"
+    assert [event.peer for event in cell.events if event.kind is EventKind.REFUSED] == ["192.0.2.77"]
 
 
 def test_a_writer_is_named_by_its_name_alone(cell: Cell, unit: Unit) -> None:
     session = ModbusSession()
     session.serve(
         {
-            1: UnitAccess(unit, Requester(None, "192.168.1.77")),
-            2: UnitAccess(unit, Requester(PLC, "192.168.1.20")),
+            1: UnitAccess(unit, Requester(None, "192.0.2.77")),
+            2: UnitAccess(unit, Requester(PLC, "192.0.2.20")),
         }
     )
     feed(session, stream("06 000a 0005", unit=1))
     feed(session, stream("06 3a98 0001", unit=2))
-    assert [event.peer for event in cell.events if event.kind is EventKind.REFUSED] == ["192.168.1.77", ""]
+    assert [event.peer for event in cell.events if event.kind is EventKind.REFUSED] == ["192.0.2.77", ""]
 
 
 def feed(session: ModbusSession, data: bytes, sizes: list[int] | None = None) -> bytes:

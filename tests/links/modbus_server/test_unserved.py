@@ -177,8 +177,8 @@ def test_a_unit_that_is_not_there(
         session = ModbusSession()
         session.serve(
             {
-                1: UnitAccess(units[1], Requester(writer, "10.0.0.7")),
-                2: UnitAccess(units[2], Requester(None, "10.0.0.7")),
+                1: UnitAccess(units[1], Requester(writer, "192.0.2.7")),
+                2: UnitAccess(units[2], Requester(None, "192.0.2.7")),
             }
         )
         request = encode(1, 7, bytes.fromhex("03 0064 0001"))
@@ -189,7 +189,7 @@ def test_a_unit_that_is_not_there(
     assert texts(first) == ["plc asked unit 7; units here: 1, 2"]
     assert texts(second) == []
     ask(None)
-    assert texts(second) == ["undeclared peer 10.0.0.7 asked unit 7; units here: 1, 2"]
+    assert texts(second) == ["undeclared peer 192.0.2.7 asked unit 7; units here: 1, 2"]
 
 
 def test_a_read_that_is_served_leaves_no_trace(cell: Cell, unit: Unit) -> None:

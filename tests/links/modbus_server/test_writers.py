@@ -11,7 +11,7 @@ from tests.links.modbus_server.conftest import HMI, NOW, PLC
 
 
 def test_a_peer_that_can_only_read_is_no_writer(unit: Unit) -> None:
-    accesses = {1: UnitAccess(unit, Requester(None, "192.168.1.77"))}
+    accesses = {1: UnitAccess(unit, Requester(None, "192.0.2.77"))}
     assert writers_of(accesses) == []
     assert names_of(accesses) == ()
     assert not hold_anything(accesses)
@@ -20,11 +20,11 @@ def test_a_peer_that_can_only_read_is_no_writer(unit: Unit) -> None:
 def test_a_writer_keeps_the_number_of_its_connection_in_the_cell_that_goes_on(
     unit: Unit, new_cell: Callable[[float], Cell]
 ) -> None:
-    accesses = {1: UnitAccess(unit, Requester(HMI, "192.168.1.21", connection=7))}
+    accesses = {1: UnitAccess(unit, Requester(HMI, "192.0.2.21", connection=7))}
     successor = new_cell(NOW)
     assert names_of(accesses) == ("hmi",)
     assert succeeded(writers_of(accesses), {unit.cell: successor}) == [
-        (successor, Requester(HMI, "192.168.1.21", connection=7))
+        (successor, Requester(HMI, "192.0.2.21", connection=7))
     ]
 
 

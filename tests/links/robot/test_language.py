@@ -9,7 +9,7 @@ TEXT = """\
 gatewayd: 1
 cell: c
 robot: {host: r, series: e, frequency: 100, watchdog: {field: input_int_register_23, requires: [plc, hmi]}}
-writers: {plc: {modbus: 10.0.0.1}, hmi: {modbus: 10.0.0.2}}
+writers: {plc: {modbus: 192.0.2.1}, hmi: {modbus: 192.0.2.2}}
 variables: {a: {robot: output_int_register_0..1}}
 """
 

@@ -15,8 +15,8 @@ LOSS = Loss(LossReason.CLOSED, "robot: connection closed", retry_in=0.5)
     "event, line",
     [
         (
-            events.ConnectedEvent(None, ("10.0.0.1", 30004)),
-            "connected to 10.0.0.1:30004 from an unknown address",
+            events.ConnectedEvent(None, ("192.0.2.1", 30004)),
+            "connected to 192.0.2.1:30004 from an unknown address",
         ),
         (events.LostEvent(LOSS, final=False), "lost: robot: connection closed; next attempt in 0.5 s"),
         (events.AttemptFailedEvent(LOSS, final=True), "robot: connection closed; given up"),

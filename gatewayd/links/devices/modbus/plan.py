@@ -46,7 +46,7 @@ class LineAddress:
 
     @property
     def text(self) -> str:
-        """`192.168.1.30:502`, `/dev/ttyUSB0 115200 8N1`."""
+        """`192.0.2.30:502`, `/dev/ttyUSB0 115200 8N1`."""
         if self.serial is not None:
             return f"{self.path} {self.serial.text}"
         return address_text(self.path, self.port) + (" RTU" if self.framing == "rtu" else "")

@@ -14,7 +14,7 @@ from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.report.format import counted
 
 _LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
-_EXAMPLES = {4: "192.168.1.2:502", 6: "[fd00::2]:502"}
+_EXAMPLES = {4: "192.0.2.2:502", 6: "[fd00::2]:502"}
 _EVERYWHERE = (ip_network("0.0.0.0/0"), ip_network("::/0"))
 _SHARED = ("connections", "connections_per_peer", "idle_timeout")
 
@@ -90,7 +90,7 @@ def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     modbus = cell.document.part(Modbus)
     if modbus is not None and not modbus.spec.allow and ip_address(modbus.spec.listen.host).is_unspecified:
         message = f"{modbus.spec.listen} serves every network of this machine, and there is no access list"
-        hint = "add `allow: [192.168.1.0/24]` with the networks that may connect"
+        hint = "add `allow: [192.0.2.0/24]` with the networks that may connect"
         yield rule.at(modbus.at("listen"), message, hint=hint)
 
 

@@ -40,7 +40,7 @@ def test_a_program_may_only_read() -> None:
     assert (found.inputs, found.writer, found.writes) == ((), "", ())
 
 
-@pytest.mark.parametrize("host", ["", "10.0.0.1';x:=1", "a b", "a\nb", "ä.example", "$N", "x" * 254])
+@pytest.mark.parametrize("host", ["", "192.0.2.1';x:=1", "a b", "a\nb", "ä.example", "$N", "x" * 254])
 def test_an_address_that_could_end_a_text_of_the_program_is_refused(host: str) -> None:
     assert "--host takes an IP address" in refused(READY, wishes=PlcWishes(writer="none", host=host))
     assert (
@@ -58,7 +58,7 @@ def test_no_address_is_made_up_where_the_gateway_listens_at_all() -> None:
     )
     with pytest.raises(ExportError, match="say with --host"):
         model_of(everywhere, PlcWishes(writer="none"))
-    assert model_of(everywhere, PlcWishes(writer="none", host="10.0.0.7")).host == "10.0.0.7"
+    assert model_of(everywhere, PlcWishes(writer="none", host="192.0.2.7")).host == "192.0.2.7"
 
 
 def test_who_the_plc_is_has_to_be_said() -> None:
@@ -81,7 +81,7 @@ def test_a_variable_may_have_another_name_in_the_plc() -> None:
 
 def test_the_address_of_the_gateway() -> None:
     assert model(START).host == "127.0.0.1"
-    assert model(START, wishes=PlcWishes(writer="plc", host="10.0.0.7")).host == "10.0.0.7"
+    assert model(START, wishes=PlcWishes(writer="plc", host="192.0.2.7")).host == "192.0.2.7"
 
 
 def test_every_word_of_the_status_block_has_its_place() -> None:

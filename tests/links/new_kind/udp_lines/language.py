@@ -57,7 +57,7 @@ class LinesLanguage(LinkLanguage):
     rules = (f"{__package__}.rules.names",)
     tables = f"{__package__}.tables"
     articles: ClassVar = {Lines: "the section `lines`"}
-    writer_example = "lines: 192.168.1.20"
+    writer_example = "lines: 192.0.2.20"
     place_example = "lines: NAME"
 
     def knows(self, writer: WriterSpec) -> bool:
