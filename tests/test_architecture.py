@@ -466,6 +466,10 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "rtde.recording": "names of its modules; tests/rtde/recording",
     "rtde.recording.errors": "errors; tests/rtde/recording/test_writing.py",
     "rtde.messages": "records; tests/rtde/test_codec.py pins them byte by byte",
+    "sparkplug.actions": "records and a protocol; tests/sparkplug/conformance/bench.py is a user",
+    "sparkplug.declarations": "records; tests/sparkplug/conformance",
+    "sparkplug.messages": "tests/sparkplug/conformance reads every message",
+    "sparkplug.states": "a table; tests/sparkplug/test_edge_node.py",
     "rtde.types": "records; tests/rtde/test_recipe.py pins their formats",
 }
 """Module -> why it has no test file of its own. A module that is only a docstring needs none."""
