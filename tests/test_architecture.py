@@ -140,7 +140,10 @@ LAYERS: dict[str, set[str]] = {
     "report.printable": set(),
     "report.wording": set(),
     "logs": {"core", "logs", "loop.clock", "loop.lines", "loop.quota", "report"},
+    "audit": {"audit", "core", "logs.records", "loop", "report"},
     "control": {
+        "audit.record",
+        "audit.trail",
         "control",
         "core",
         "links.access",
@@ -150,8 +153,6 @@ LAYERS: dict[str, set[str]] = {
         "loop",
         "mapping.plan",
         "report",
-        "service.audit",
-        "service.audit_record",
     },
     "control.client": {"control.paths"},
     "control.paths": set(),
@@ -167,6 +168,7 @@ LAYERS: dict[str, set[str]] = {
         "report",
     },
     "service": {
+        "audit",
         "control",
         "core",
         "gatewayd",
@@ -212,6 +214,7 @@ LAYERS: dict[str, set[str]] = {
     },
     "web.histogram": set(),
     "demo": {
+        "audit.record",
         "core",
         "demo",
         "links.contract",

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from gatewayd import __version__
+from gatewayd.audit.record import Record, utc
+from gatewayd.audit.trail import Audit
 from gatewayd.control.names import NamePattern
 from gatewayd.control.packages import PackageFeeds
 from gatewayd.control.trace import TracedGateway, Traces
@@ -33,8 +35,6 @@ from gatewayd.loop.share import LoopShare
 from gatewayd.report.format import interval
 from gatewayd.report.schema import EventMessage, Json, LockStatus, Status, VersionInfo
 from gatewayd.report.verdict import ServedCell
-from gatewayd.service.audit import Audit
-from gatewayd.service.audit_record import Record, utc
 
 API_VERSION = 1
 STALE_ACT = 0.5

@@ -9,6 +9,8 @@ import logging
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from gatewayd.audit.record import Record, plain_value
+from gatewayd.audit.trail import Audit
 from gatewayd.control.api import Api, ApiError, Gateway
 from gatewayd.links.access import (
     AccessError,
@@ -25,8 +27,6 @@ from gatewayd.loop import clock
 from gatewayd.report.event_text import DEVICE_WRITTEN, REFUSED, EventRecord
 from gatewayd.report.schema import Json
 from gatewayd.report.verdict import ServedCell
-from gatewayd.service.audit import Audit
-from gatewayd.service.audit_record import Record, plain_value
 
 _STATUS: Final = {
     AccessProblem.BAD_PLACE: 400,

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
+from gatewayd.audit.record import Record, plain_value, utc
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR, Direction, Fallback, FallbackKind, Value
 from gatewayd.core.events import Event, EventKind
@@ -34,7 +35,6 @@ from gatewayd.report.schema import (
     WriterStatus,
 )
 from gatewayd.report.verdict import CellVerdict, PicturePart, ServedCell, verdict_of
-from gatewayd.service.audit_record import Record, plain_value, utc
 
 ForceState = tuple[Value, float, tuple[Value, Quality] | None]
 """The forced value, its time left, and the `truth` beside it."""

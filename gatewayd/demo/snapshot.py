@@ -6,6 +6,7 @@ import math
 import time
 from dataclasses import dataclass
 
+from gatewayd.audit.record import utc
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.events import Event, EventKind
@@ -21,7 +22,6 @@ from gatewayd.report.event_text import BAD, UNDECLARED_PEER, EventRecord
 from gatewayd.report.format import age, value
 from gatewayd.report.layout import Row
 from gatewayd.report.words import SOURCES
-from gatewayd.service.audit_record import utc
 
 REFUSAL_SHOWN = 5.0
 """Seconds for which a refusal of a Modbus client stands beside its variable."""

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Protocol
 
+from gatewayd.audit.file import AuditFile
+from gatewayd.audit.trail import Audit
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Endpoint, Reload
 from gatewayd.control.trace import TracedGateway
@@ -16,8 +18,6 @@ from gatewayd.core.cell import Cell
 from gatewayd.logs.stream import log_troubles
 from gatewayd.loop import clock
 from gatewayd.loop.retry import keep_running
-from gatewayd.service.audit import Audit
-from gatewayd.service.audit_file import AuditFile
 from gatewayd.service.daemon import RETRY_PERIOD
 from gatewayd.service.watchdog import Watched
 

@@ -38,10 +38,10 @@ class Running:
 @pytest.fixture
 def gateway(tmp_path: Path) -> Iterator[Running]:
     """One cell, `press`, as in tests/control/served.py; its robot up at time 0 of the monotonic clock."""
+    from gatewayd.audit.trail import Audit
     from gatewayd.control import server
     from gatewayd.control.api import Api
     from gatewayd.control.endpoint import bind
-    from gatewayd.service.audit import Audit
 
     served = Served(plan(), Cell(plan().cell))
     bring_up(served.cell, 0.0)

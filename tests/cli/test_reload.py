@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from gatewayd.audit.trail import Audit
 from gatewayd.cli.reload import command
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import bind
 from gatewayd.control.server import serving
 from gatewayd.core.objection import Objection, ObjectionKind
-from gatewayd.service.audit import Audit
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.reload import CellObjection, ReloadOutcome
 from gatewayd.service.reload import Result as Ended

@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from gatewayd.audit.trail import Audit
 from gatewayd.cli.watching import KEYS, Glimpse, Show, View, chosen, plain, press, screen, settled
 from gatewayd.control.api import Api
 from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
-from gatewayd.service.audit import Audit
 from tests.control.served import CYCLES, SPEED, FixedGateway, Served, at, bring_up, plan
 from tests.works import finished
 

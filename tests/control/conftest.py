@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from gatewayd.audit.trail import Audit
 from gatewayd.control.api import Api
 from gatewayd.core.cell import Cell
-from gatewayd.service.audit import Audit
 from tests.control.served import FixedGateway, Served, bring_up, plan
 
 

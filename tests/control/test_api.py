@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from gatewayd.audit.trail import Audit
 from gatewayd.control.api import NEWS, Api, ApiError, Cursor
 from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
@@ -13,7 +14,6 @@ from gatewayd.core.definition import OPERATOR
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
-from gatewayd.service.audit import Audit
 from tests.control.served import LIMIT, PATH, SPEED, FixedGateway, Served, at, bring_up, plan
 from tests.works import finished
 

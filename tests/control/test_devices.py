@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import pytest
 
+from gatewayd.audit.trail import Audit
 from gatewayd.control.api import Api, ApiError
 from gatewayd.control.devices import devices_by_hand
 from gatewayd.core.cell import Cell
 from gatewayd.links.access import AccessError, AccessProblem, PlaceAnswer, PlaceRequest, PlaceValue
 from gatewayd.links.contract import Link
-from gatewayd.service.audit import Audit
 from tests.control.served import FixedGateway, Served
 from tests.links.devices.cells import HEAD, VARIABLES, planned
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from gatewayd.audit.trail import Audit
 from gatewayd.control import server
 from gatewayd.control.api import Api
 from gatewayd.control.client import Client, ControlError
@@ -23,7 +24,6 @@ from gatewayd.control.packages import MAX_FEEDS
 from gatewayd.core.objection import ObjectionKind
 from gatewayd.links.contract import PackageLayout, PackageTap
 from gatewayd.loop.share import Busy, LoopShare
-from gatewayd.service.audit import Audit
 from tests.control.served import CYCLES, LIMIT, FixedGateway, Served
 
 

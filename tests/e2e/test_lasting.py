@@ -61,7 +61,7 @@ WALL_CLOCK = {
     "cli/rtde/robot_source": "the time of a package in a recording",
     "control/server": "the time in answers",
     "demo/snapshot": "the time on the screen",
-    "service/audit": "the time of a record",
+    "audit/trail": "the time of a record",
     "web/view": "the time on the page",
 }
 """The only modules that may ask the wall clock, and what for."""

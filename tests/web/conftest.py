@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd.audit.trail import Audit
 from gatewayd.control.api import Api
 from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load
-from gatewayd.service.audit import Audit
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.listener import StatusListener

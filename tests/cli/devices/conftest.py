@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd.audit.trail import Audit
 from gatewayd.control import server as control_server
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import bind
@@ -18,7 +19,6 @@ from gatewayd.core.cell import Cell
 from gatewayd.links.devices.modbus.lines import ModbusLines
 from gatewayd.links.devices.modbus.link import ModbusDeviceLink
 from gatewayd.modbus.client.unit import UnitState
-from gatewayd.service.audit import Audit
 from tests.control.served import FixedGateway, Served
 from tests.links.devices.cells import HEAD, VARIABLES, device, planned
 from tests.modbus.client.server import Server

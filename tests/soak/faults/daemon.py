@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 from random import Random
 
-from gatewayd.service.audit_file import KEPT, MAX_SIZE
-from gatewayd.service.audit_merging import EACH_PERIOD
+from gatewayd.audit.file import KEPT, MAX_SIZE
+from gatewayd.audit.merging import EACH_PERIOD
 from tests.e2e.plc import STRANGER, Plc
 from tests.e2e.processes import HOST, wait_for
 from tests.soak.cell import MOMENT, STALE_AFTER, VARIANTS

@@ -5,8 +5,8 @@ import math
 
 import pytest
 
+from gatewayd.audit.record import Record, plain_value, utc
 from gatewayd.report.event_text import ACCEPTED, EventRecord
-from gatewayd.service.audit_record import Record, plain_value, utc
 
 WALL = 1_800_000_000.0
 

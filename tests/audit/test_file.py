@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd.audit import file as auditfile
+from gatewayd.audit.file import HANGS, AuditFile
 from gatewayd.loop import clock
-from gatewayd.service import audit_file as auditfile
-from gatewayd.service.audit_file import HANGS, AuditFile
 
 Opened = Callable[..., AuditFile]
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
+from gatewayd.audit.merging import ALARM, ALL, EACH, EACH_PERIOD, OF_WRITER, WAITING, AuditMerging
+from gatewayd.audit.record import Record
 from gatewayd.report.event_text import ACCEPTED, EventRecord
-from gatewayd.service.audit_merging import ALARM, ALL, EACH, EACH_PERIOD, OF_WRITER, WAITING, AuditMerging
-from gatewayd.service.audit_record import Record
 
 WALL = 1_800_000_000.0
 

@@ -10,13 +10,13 @@ from itertools import pairwise
 
 import pytest
 
+from gatewayd.audit.record import Record
+from gatewayd.audit.trail import MERGED, Audit
 from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.requester import Requester
 from gatewayd.report.event_text import ACCEPTED, EventRecord
-from gatewayd.service.audit import MERGED, Audit
-from gatewayd.service.audit_record import Record
 
 NUMBER, REAL = 0, 1
 PLC, HMI = 0, 1
@@ -240,7 +240,7 @@ def test_a_flood_is_merged_and_nothing_of_it_is_lost(cell: Cell, audit: Audit, l
 def test_a_writer_that_does_too_much_is_a_trouble(
     cell: Cell, audit: Audit, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gatewayd.service.audit_merging.ALARM", 10.0)
+    monkeypatch.setattr("gatewayd.audit.merging.ALARM", 10.0)
     for turn in range(2000):
         assert cell.request(Requester(PLC), NUMBER, 1.0) is None
         assert cell.release(Requester(PLC), NUMBER, 1.0) is None

@@ -11,10 +11,10 @@ import math
 from collections.abc import Callable, Hashable
 from dataclasses import replace
 
+from gatewayd.audit.record import Record
 from gatewayd.core.requester import host_of
 from gatewayd.loop.quota import Quota
 from gatewayd.report.event_text import ACCEPTED, EventRecord
-from gatewayd.service.audit_record import Record
 
 EACH, EACH_PERIOD = 30, 30.0
 """Equal records that are kept one by one, and seconds for each further one."""

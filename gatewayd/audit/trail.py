@@ -3,7 +3,7 @@
 Every accepted write that changes something, every refusal, and whatever happens to locks, fallbacks and forces becomes
 a record. A rewrite of an unchanged value is none: a PLC that writes its whole image at 100 Hz would bury the rest. Of
 a value that one writer keeps changing, the first change is recorded at once, the others of the next `MERGED` seconds
-together. Refusals are merged by the cell itself. What is too much all the same is merged (`service.audit_merging`).
+together. Refusals are merged by the cell itself. What is too much all the same is merged (`audit.merging`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
+from gatewayd.audit.merging import AuditMerging
+from gatewayd.audit.record import Record
 from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Value
 from gatewayd.core.events import Event, EventKind
@@ -25,8 +27,6 @@ from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.report.event_text import ACCEPTED, EventRecord
 from gatewayd.report.printable import json_text
-from gatewayd.service.audit_merging import AuditMerging
-from gatewayd.service.audit_record import Record
 
 CAPACITY = 2000
 """Last records kept in memory, of all cells together; of each kind older ones are kept beside them (`core.history`)."""
