@@ -8,7 +8,6 @@ connection, for the one that comes late would be taken for the answer to somethi
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import errno
 import socket
 from collections.abc import Awaitable, Callable
@@ -19,8 +18,8 @@ from gatewayd.dashboard.replies import CommandOutcome, DashboardReply, reply_to
 from gatewayd.dashboard.requests import SENT_WITHIN, TOLD_WITHIN, DashboardRequest, StateQuestion
 from gatewayd.dashboard.state import RobotState, Round
 from gatewayd.loop import clock
+from gatewayd.loop.connect import DeadPeer, connect
 from gatewayd.loop.progress import wait_with_progress
-from gatewayd.loop.resolve import resolve
 
 CONNECT_WITHIN = 5.0
 """Seconds for a connection."""
@@ -29,12 +28,7 @@ GREETED_WITHIN = 10.0
 _RETRY, _MAX_RETRY = 1.0, 5.0
 """Seconds before another connection, after the first failure and at most."""
 
-_KEEPALIVE: Final = (
-    ("TCP_KEEPIDLE", 1),
-    ("TCP_KEEPINTVL", 1),
-    ("TCP_KEEPCNT", 3),
-    ("TCP_USER_TIMEOUT", 5000),
-)
+_DEAD_PEER: Final = DeadPeer(idle=1, interval=1, probes=3, unacknowledged=5000)
 _Result = TypeVar("_Result")
 
 StreamTap = Callable[[bytes, bool, tuple[str, int] | None], None]
@@ -131,7 +125,7 @@ class DashboardClient:
     async def _connect(self, line: _Line) -> None:
         try:
             async with asyncio.timeout(CONNECT_WITHIN):
-                await self._wait(_open(line, self._host, self._port), CONNECT_WITHIN)
+                await self._wait(connect(lambda: line, self._host, self._port, _DEAD_PEER), CONNECT_WITHIN)
         except TimeoutError:
             raise _LostError("no answer: is the robot powered, and is the address right?") from None
         await self._read(line, GREETED_WITHIN, "it did not greet")
@@ -292,39 +286,6 @@ class _Line(asyncio.Protocol):
         self._reason = self._reason or reason
         self.ended.set()
         self._arrived.set()
-
-
-async def _open(line: _Line, host: str, port: int) -> None:
-    """Connect to the host's addresses in turn; raises the error of the last if none answers."""
-    loop = asyncio.get_running_loop()
-    failure: OSError = socket.gaierror(socket.EAI_NONAME, "no address")
-    for family, kind, protocol, address in await resolve(host, port):
-        candidate = socket.socket(family, kind, protocol)
-        try:
-            candidate.setblocking(False)
-            _tune(candidate)
-            await loop.sock_connect(candidate, address)
-            await loop.create_connection(lambda: line, sock=candidate)
-        except OSError as error:
-            candidate.close()
-            failure = error
-        except BaseException:
-            candidate.close()
-            raise
-        else:
-            return
-    raise failure
-
-
-def _tune(candidate: socket.socket) -> None:
-    """No delay of small writes; a dead peer is noticed within seconds, while nothing is due from it too."""
-    candidate.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    candidate.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    for name, value in _KEEPALIVE:
-        option = getattr(socket, name, None)
-        if option is not None:
-            with contextlib.suppress(OSError):
-                candidate.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
 _FAILURES: Final = {

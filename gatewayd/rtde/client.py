@@ -9,13 +9,11 @@ order, also those that waited together. The decisions are in `gatewayd.rtde.nego
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import socket
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from gatewayd.loop.connect import DeadPeer, connect
 from gatewayd.loop.progress import wait_with_progress
-from gatewayd.loop.resolve import resolve
 from gatewayd.rtde.claims import InputRecipe
 from gatewayd.rtde.connection import Connection
 from gatewayd.rtde.handler import ClientHandler, ConnectionObserver
@@ -27,8 +25,6 @@ from gatewayd.rtde.receiving import PackageReceiver
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.sending import StreamTap
 from gatewayd.rtde.session import ClientSettings, Session
-
-_KEEPALIVE = (("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", 3))
 
 
 class RtdeClient:
@@ -197,52 +193,19 @@ class RtdeClient:
         return replace(loss, started=True), asyncio.get_running_loop().time() - connection.started_at
 
     async def _connect(self, settings: ClientSettings) -> Connection:
-        loop = asyncio.get_running_loop()
+        unacknowledged = max(1000, int(self._settings.data_timeout * 1000))
         async with asyncio.timeout(settings.connect_timeout):
-            connected = await self._open_socket(loop)
-            try:
-                _, connection = await loop.create_connection(
-                    lambda: self._new_connection(settings), sock=connected
-                )
-            except BaseException:
-                connected.close()
-                raise
-        return connection
+            return await connect(
+                lambda: self._new_connection(settings),
+                self._settings.host,
+                self._settings.port,
+                DeadPeer(idle=1, interval=1, probes=3, unacknowledged=unacknowledged),
+            )
 
     def _new_connection(self, settings: ClientSettings) -> Connection:
         connection = Connection(settings, self._handler, self.statistics, self._observer)
         connection.trace(self._tap)
         return connection
-
-    async def _open_socket(self, loop: asyncio.AbstractEventLoop) -> socket.socket:
-        """Try the host's addresses in turn; the error of the last if none answers."""
-        failure: OSError = socket.gaierror(socket.EAI_NONAME, "no address")
-        for family, kind, protocol, address in await resolve(self._settings.host, self._settings.port):
-            candidate = socket.socket(family, kind, protocol)
-            try:
-                candidate.setblocking(False)
-                self._tune(candidate)
-                await loop.sock_connect(candidate, address)
-            except OSError as error:
-                candidate.close()
-                failure = error
-            except BaseException:
-                candidate.close()
-                raise
-            else:
-                return candidate
-        raise failure
-
-    def _tune(self, candidate: socket.socket) -> None:
-        """No delay of small writes; a dead peer is noticed even while nothing is due from it."""
-        candidate.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        candidate.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        unacknowledged = max(1000, int(self._settings.data_timeout * 1000))
-        for name, value in (*_KEEPALIVE, ("TCP_USER_TIMEOUT", unacknowledged)):
-            option = getattr(socket, name, None)
-            if option is not None:
-                with contextlib.suppress(OSError):
-                    candidate.setsockopt(socket.IPPROTO_TCP, option, value)
 
     def _count(self) -> None:
         self.statistics.progress += 1

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from gatewayd.loop.resolve import resolve
+from gatewayd.loop.connect import DeadPeer, connect
 from gatewayd.modbus.client.conversation import Conversation, RtuConversation, TcpConversation
 from gatewayd.modbus.client.line import Line
 from gatewayd.modbus.client.runner import LineError, LineRunner
@@ -17,16 +17,8 @@ from gatewayd.modbus.client.timing import RtuTiming
 
 SILENCE_LIMIT = 5.0
 """Seconds without any answer after which another connection is tried."""
-_UNACKNOWLEDGED = 3000
-"""Milliseconds after which the kernel gives up what the peer does not acknowledge (RFC 5482).
-
-Otherwise the pauses between its repetitions grow to minutes, and a device that was off would be found as late."""
-_KEEPALIVE = (
-    (socket.TCP_KEEPIDLE, 5),
-    (socket.TCP_KEEPINTVL, 2),
-    (socket.TCP_KEEPCNT, 3),
-)
-"""Seconds of silence, seconds between probes of the kernel, and how many of them: 11 s for a peer that is gone."""
+_DEAD_PEER = DeadPeer(idle=5, interval=2, probes=3, unacknowledged=3000)
+"""A device that was switched off is noticed after 11 s while nothing is underway, and after 3 s otherwise."""
 
 
 class TcpFrames(Enum):
@@ -61,23 +53,12 @@ class TcpLine(LineRunner):
 
     async def open(self) -> _TcpChannel:
         """See LineRunner."""
-        loop = asyncio.get_running_loop()
         try:
-            addresses = await resolve(self.address.host, self.address.port)
-        except OSError as error:
+            return await connect(lambda: _TcpChannel(self), self.address.host, self.address.port)
+        except socket.gaierror as error:
             raise LineError(f"{self.address.host} has no address: {error.strerror or error}") from error
-        problem: OSError | None = None
-        for family, _, _, address in addresses:
-            try:
-                _, channel = await loop.create_connection(
-                    lambda: _TcpChannel(self), str(address[0]), int(address[1]), family=family
-                )
-            except OSError as error:
-                problem = error
-            else:
-                return channel
-        assert problem is not None
-        raise LineError(f"{self.address}: {_in_words(problem)}") from problem
+        except OSError as error:
+            raise LineError(f"{self.address}: {_in_words(error)}") from error
 
     def make_conversation(self) -> Conversation:
         """See LineRunner."""
@@ -97,11 +78,8 @@ class _TcpChannel(asyncio.Protocol):
         """See asyncio.Protocol."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        connection = transport.get_extra_info("socket")
-        # asyncio has set TCP_NODELAY. Keep-alive notices a peer that was switched off while nothing is underway.
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        for option, value in (*_KEEPALIVE, (socket.TCP_USER_TIMEOUT, _UNACKNOWLEDGED)):
-            connection.setsockopt(socket.IPPROTO_TCP, option, value)
+        # Not before the connection: how long the attempt may take is the setting of the line.
+        _DEAD_PEER.watch(transport.get_extra_info("socket"))
 
     def data_received(self, data: bytes) -> None:
         """See asyncio.Protocol."""
