@@ -34,6 +34,7 @@ SLOW = (
     "demo/test_snapshot.py",
     "docs",
     "e2e",
+    "fleet",
     "kernel",
     "links/new_kind",
     "mapping/test_check_fuzz.py",

@@ -408,6 +408,76 @@ def configure_with_a_mistake() -> Facts:
 
 
 @step
+def wall_clock() -> Facts:
+    """A year ahead, and back to 1971, for longer than the watchdog waits; then as it was."""
+    began, at = time.time(), time.monotonic()
+    before, gaps = show(), registers(60048, 1)[0]
+    seen = []
+    for moment in (began + 365 * 86400, 365 * 86400.0):
+        time.clock_settime(time.CLOCK_REALTIME, moment)
+        until = time.monotonic() + 3
+        fresh = True
+        while time.monotonic() < until:
+            fresh = fresh and registers(60007, 1)[0] == 2
+            time.sleep(0.1)
+        seen.append({"fresh": fresh, "robot fresh": is_fresh(), "state": show()})
+    time.clock_settime(time.CLOCK_REALTIME, began + time.monotonic() - at)
+    return {"before": before, "seen": seen, "gaps": registers(60048, 1)[0] - gaps}
+
+
+@step
+def mappings_by_git() -> Facts:
+    """As howto/many-cells.md sets it up: another user fetches, the gateway serves what it has put into place."""
+    examples, plant = "/usr/share/doc/gatewayd/examples", Path("/var/lib/plant")
+    sh(f"""
+        install -m 755 {examples}/gatewayd-mappings /usr/local/sbin/
+        install -m 644 {examples}/gatewayd-mappings.service {examples}/gatewayd-mappings.timer /etc/systemd/system/
+        install -D -m 644 {examples}/gatewayd-mappings.sysusers /etc/sysusers.d/gatewayd-mappings.conf
+        systemd-sysusers gatewayd-mappings.conf
+        git init --quiet --initial-branch=main {plant}
+        chown -R gatewayd-mappings {plant}
+    """)
+    Path("/etc/default/gatewayd-mappings").write_text(f"MAPPINGS_REMOTE={plant}\n")
+
+    def change(text: str) -> Facts:
+        (plant / "press-3.yaml").write_text(text)
+        commit = (
+            f"cd {plant} && git add . && git -c user.name=a -c user.email=a@example.org commit -qm change"
+        )
+        committed = sh(f'runuser -u gatewayd-mappings -- sh -c "{commit}"')
+        return {"committed": committed.stderr, **timed("systemctl start gatewayd-mappings")}
+
+    first = change(MORE)
+    drop_in = Path("/etc/systemd/system/gatewayd.service.d/mappings-by-git.conf")
+    sh(f"install -D -m 644 {examples}/mappings-by-git.conf {drop_in}")
+    sh("systemctl daemon-reload && systemctl restart gatewayd")
+    bad = change(BROKEN)
+    postinst = Path("/var/lib/dpkg/info/gatewayd.postinst").read_text()
+    where = postinst.split("$(systemctl show", 1)[1].split(')"', 1)[0].replace('"$unit"', "gatewayd.service")
+    found = {
+        "first": first,
+        "bad": bad,
+        "state": show("gatewayd-mappings.service"),
+        "gateway": show(),
+        "command": Path(f"/proc/{show()['MainPID']}/cmdline").read_text().split("\0"),
+        "checked by an upgrade": sh(f"systemctl show{where}").stdout.strip(),
+        "journal": sh("journalctl --boot --no-pager --output=cat --unit=gatewayd-mappings").stdout,
+        "timer": timed(
+            "systemctl start gatewayd-mappings.timer && systemctl is-active gatewayd-mappings.timer"
+        ),
+        "modes": sh(
+            "stat -c '%n %a %U:%G' /var/lib/gatewayd-mappings /var/lib/gatewayd-mappings/current/*"
+        ).stdout,
+        "metrics": sh("runuser -u nobody -- cat /run/gatewayd-mappings/gatewayd_mappings.prom").stdout,
+        "touched": sh("runuser -u gatewayd -- touch /var/lib/gatewayd-mappings/current/x").returncode,
+    }
+    sh("systemctl stop gatewayd-mappings.timer; systemctl reset-failed gatewayd-mappings")
+    drop_in.unlink()
+    sh("systemctl daemon-reload")
+    return found
+
+
+@step
 def stop() -> Facts:
     """Orderly."""
     sh("logger before-stop; journalctl --sync")

@@ -209,6 +209,41 @@ def test_an_upgrade_leaves_a_cell_alone_that_it_would_not_serve(steps: Facts) ->
     assert seen["after"]["MainPID"] == seen["before"]["MainPID"]
 
 
+def test_steps_of_the_wall_clock_by_years_matter_to_nobody(steps: Facts) -> None:
+    seen = steps["wall_clock"]
+    for moment in seen["seen"]:
+        assert moment["fresh"]
+        assert moment["robot fresh"]
+        assert is_running(moment["state"])
+        assert moment["state"]["MainPID"] == seen["before"]["MainPID"]
+    assert seen["gaps"] == 0
+
+
+def test_mappings_come_by_git_through_another_user(steps: Facts) -> None:
+    seen = steps["mappings_by_git"]
+    assert seen["first"]["code"] == 0, seen
+    assert "/var/lib/gatewayd-mappings 750 gatewayd-mappings:gatewayd" in seen["modes"]
+    assert "press-3.yaml 640 gatewayd-mappings:gatewayd" in seen["modes"]
+    assert seen["touched"] != 0, "the gateway cannot change its mapping"
+    assert is_running(seen["gateway"])
+    assert "/var/lib/gatewayd-mappings/current" in seen["command"]
+    assert seen["timer"]["code"] == 0, seen["timer"]
+
+
+def test_a_bad_mapping_from_git_fails_visibly_and_displaces_nothing(steps: Facts) -> None:
+    seen = steps["mappings_by_git"]
+    assert seen["bad"]["code"] != 0
+    assert seen["state"]["ActiveState"] == "failed"
+    assert "GW102" in seen["journal"]
+    assert "what runs goes on" in seen["journal"]
+    assert "gatewayd_mappings_ok 0" in seen["metrics"]
+
+
+def test_an_upgrade_checks_the_mappings_that_the_service_reads(steps: Facts) -> None:
+    """Not /etc/gatewayd, where a drop-in names another directory."""
+    assert steps["mappings_by_git"]["checked by an upgrade"] == "/var/lib/gatewayd-mappings/current"
+
+
 def test_a_stop_is_orderly(steps: Facts) -> None:
     seen = steps["stop"]
     assert seen["code"] == 0

@@ -98,6 +98,39 @@ def test_serial_ports_cost_little(tmp_path: Path) -> None:
     assert exposure(tree(tmp_path, "serial-ports.conf") / UNITS[0]) <= MOST_EXPOSURE + 0.3
 
 
+MAPPINGS_BY_GIT = ("gatewayd-mappings.service", "gatewayd-mappings.timer")
+
+
+def mappings_by_git(target: Path) -> Path:
+    """The units that fetch mappings, and the gateway's with the drop-in; programs that exist."""
+    exists = shutil.which("true") or "/bin/true"
+    for name in MAPPINGS_BY_GIT:
+        text = (SYSTEMD / "examples" / name).read_text()
+        (target / name).write_text(text.replace("/usr/local/sbin/gatewayd-mappings", exists))
+    tree(target, "mappings-by-git.conf")
+    drop_in = target / "gatewayd.service.d/mappings-by-git.conf"
+    drop_in.write_text(drop_in.read_text().replace("/usr/bin/gatewayd", exists))
+    return target
+
+
+@needs_systemd
+@pytest.mark.parametrize("unit", [*MAPPINGS_BY_GIT, "gatewayd.service"])
+def test_systemd_finds_no_mistake_in_the_units_that_fetch_mappings(unit: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        ["systemd-analyze", "verify", "--man=no", mappings_by_git(tmp_path) / unit],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@needs_systemd
+def test_exposure_of_what_fetches_mappings(tmp_path: Path) -> None:
+    """It has no address list: where the git server is the plant knows."""
+    assert exposure(mappings_by_git(tmp_path) / "gatewayd-mappings.service") <= MOST_EXPOSURE
+
+
 def test_the_template_differs_in_what_it_must() -> None:
     """Two files say the same, so a change of one is a change of both."""
     one, template = (settings(SYSTEMD / unit) for unit in UNITS)

@@ -1,4 +1,4 @@
-"""docs/grafana.json and docs/alerts.yaml ask only for what /metrics tells, by labels that it has."""
+"""docs/grafana.json, grafana-fleet.json and alerts.yaml ask only for what /metrics tells, by labels that it has."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from gatewayd.core.refusal import Reason
 from gatewayd.web.metrics import LINK_LABEL, METRICS, PROCESS_METRICS, MetricKind
 
 DOCS = Path(__file__).parents[2] / "docs"
+MAPPINGS = (DOCS.parent / "systemd/examples/gatewayd-mappings").read_text()
+"""The script that leaves metrics for node_exporter."""
 OF_PROMETHEUS = {"instance", "job", "le"}
 """Labels that Prometheus adds, or that a histogram has."""
 
@@ -26,6 +28,9 @@ def _known() -> dict[str, set[str]]:
     for info in METRICS:
         suffixes = ("_bucket", "_sum", "_count") if info.kind is MetricKind.HISTOGRAM else ("",)
         found |= {info.name + suffix: set(info.labels) for suffix in suffixes}
+    for name in re.findall(r"# TYPE (\w+) gauge", MAPPINGS):
+        labels = re.search(name + r"\{(.*?)\} ", MAPPINGS)
+        found[name] = set(re.findall(r"(\w+)=", labels[1])) if labels else set()
     return found
 
 
@@ -49,10 +54,10 @@ def _texts(value: Any, key: str) -> Iterator[str]:
             yield from _texts(inner, key)
 
 
-DASHBOARD = json.loads((DOCS / "grafana.json").read_text())
+DASHBOARDS = {name: json.loads((DOCS / f"{name}.json").read_text()) for name in ("grafana", "grafana-fleet")}
 ALERTS = YAML(typ="safe", pure=True).load((DOCS / "alerts.yaml").read_text())
 RULES = [rule for group in ALERTS["groups"] for rule in group["rules"]]
-EXPRESSIONS = sorted({*_texts(DASHBOARD, "expr"), *(rule["expr"] for rule in RULES)})
+EXPRESSIONS = sorted({*_texts(DASHBOARDS, "expr"), *(rule["expr"] for rule in RULES)})
 
 
 @pytest.mark.parametrize("expression", EXPRESSIONS)
@@ -85,13 +90,15 @@ def test_an_alert_says_where_it_is_and_how_bad(rule: dict[str, Any]) -> None:
 
 def test_legends_use_labels_that_exist() -> None:
     labels = OF_PROMETHEUS.union(*KNOWN.values(), {LINK_LABEL})  # of devices
-    for legend in _texts(DASHBOARD, "legendFormat"):
+    for legend in _texts(DASHBOARDS, "legendFormat"):
         assert set(re.findall(r"\{\{(\w+)\}\}", legend)) <= labels
 
 
-def test_panels_lie_side_by_side() -> None:
+@pytest.mark.parametrize("name", DASHBOARDS)
+def test_panels_lie_side_by_side(name: str) -> None:
     places: set[tuple[int, int]] = set()
-    for panel in DASHBOARD["panels"]:
+    assert len({panel["id"] for panel in DASHBOARDS[name]["panels"]}) == len(DASHBOARDS[name]["panels"])
+    for panel in DASHBOARDS[name]["panels"]:
         at = panel["gridPos"]
         cells = {(x, y) for x in range(at["x"], at["x"] + at["w"]) for y in range(at["y"], at["y"] + at["h"])}
         assert at["x"] + at["w"] <= 24
@@ -106,8 +113,6 @@ def test_every_metric_of_the_cells_is_looked_at_or_named_here() -> None:
         info.name for info in METRICS if used & {info.name, f"{info.name}_bucket", f"{info.name}_count"}
     }
     assert {info.name for info in METRICS} - looked_at == {
-        "gatewayd_info",  # for joins
-        "gatewayd_cell_info",  # for joins
         "gatewayd_uptime_seconds",
         "gatewayd_robot_state",  # robot_up and the status page say it in words
         "gatewayd_robot_packages_total",  # package_rate says it

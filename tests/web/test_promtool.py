@@ -20,7 +20,7 @@ from tests.e2e.test_devices import Island
 PROMTOOL = shutil.which("promtool")
 DOCS = Path(__file__).parents[2] / "docs"
 ALERTS = DOCS / "alerts.yaml"
-UNIT_TESTS = Path(__file__).parent / "alerts_test.yaml"
+UNIT_TESTS = (Path(__file__).parent / "alerts_test.yaml", DOCS.parent / "tests/fleet/alerts_test.yaml")
 MAPPING = """\
 canopen: {interface: virtual, channel: promtool, bitrate: 500000, node: 16}
 devices:
@@ -57,14 +57,14 @@ def test_the_rules_are_valid() -> None:
 
 @with_promtool
 def test_each_rule_fires_when_it_should_and_only_then() -> None:
-    assert "SUCCESS" in promtool("test", "rules", UNIT_TESTS)
+    assert "SUCCESS" in promtool("test", "rules", *UNIT_TESTS)
 
 
 def test_the_unit_tests_have_each_rule_firing_and_silent() -> None:
     yaml = YAML(typ="safe", pure=True)
-    rules = yaml.load(ALERTS.read_text())["groups"][0]["rules"]
+    rules = [rule for group in yaml.load(ALERTS.read_text())["groups"] for rule in group["rules"]]
     firing, silent = set[str](), set[str]()
-    for test in yaml.load(UNIT_TESTS.read_text())["tests"]:
+    for test in (test for path in UNIT_TESTS for test in yaml.load(path.read_text())["tests"]):
         for case in test["alert_rule_test"]:
             (firing if case["exp_alerts"] else silent).add(case["alertname"])
     assert firing == silent == {rule["alert"] for rule in rules}
