@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gatewayd.loop.threads import in_daemon_thread
+from gatewayd.whole_file import whole_file
 
 FORMAT = 1
 """Version of the file."""
@@ -99,20 +99,11 @@ class JsonStore(Store):
             ) from None
 
     def save(self, saved: Saved) -> None:
-        """Write beside the file, wait for the disk, then take its place. The directory need not exist yet."""
-        beside = self.path.with_name(self.path.name + ".new")
+        """Replace the file once the new one is on the disk. The directory need not exist yet."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with beside.open("w", encoding="ascii") as file:
-                file.write(json.dumps(_encode(saved), indent=1) + "\n")
-                file.flush()
-                os.fsync(file.fileno())
-            beside.replace(self.path)
-            directory = os.open(self.path.parent, os.O_RDONLY)
-            try:
-                os.fsync(directory)
-            finally:
-                os.close(directory)
+            with whole_file(self.path, overwrite=True) as unfinished:
+                unfinished.write_text(json.dumps(_encode(saved), indent=1) + "\n", encoding="ascii")
         except OSError as error:
             raise StoreError(f"{self.path}: cannot be written: {error}") from None
 
