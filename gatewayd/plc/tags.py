@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, TypeVar
+from typing import Final, TypedDict, TypeVar
 
-from gatewayd.core.definition import CellDefinition, Variable
+from gatewayd.core.definition import CellDefinition, Fallback, Limits, ValueKind, Variable
 from gatewayd.links.exports import ExportError
-from gatewayd.plc.model import Tag, TagFamily
+from gatewayd.plc.model import Encoding, Tag, TagFamily
+from gatewayd.plc.numbers import value_type
+from gatewayd.report.printable import printable
 from gatewayd.report.wording import alternatives, did_you_mean
 
 NOBODY: Final = "none"
@@ -34,6 +36,47 @@ class PlcWishes:
 def owners(variable: Variable, cell: CellDefinition) -> tuple[int, ...]:
     """Writers that may own it; none of an output."""
     return () if variable.lock is None else cell.locks[variable.lock].owners
+
+
+class TagKeys(TypedDict):
+    """What a tag has of its variable, on whatever link (`Tag`)."""
+
+    number: int
+    name: str
+    member: str
+    element: int | None
+    kind: ValueKind
+    type: str
+    arithmetic: str
+    encoding: Encoding | None
+    unit: str
+    comment: str
+    limits: Limits | None
+    on_stale: Fallback
+    owners: tuple[int, ...]
+
+
+def tag_keys(variable: Variable, cell: CellDefinition, encoding: Encoding | None) -> TagKeys:
+    """These of one variable. `encoding`: its number on the wire; None: a bit."""
+    member, element = split_name(variable.name)
+    kind, arithmetic = "BOOL", ""
+    if encoding is not None:
+        kind, arithmetic = value_type(variable.kind, encoding.type, encoding.scale, encoding.offset)
+    return {
+        "number": variable.number,
+        "name": variable.name,
+        "member": member,
+        "element": element,
+        "kind": variable.kind,
+        "type": kind,
+        "arithmetic": arithmetic,
+        "encoding": encoding,
+        "unit": printable(variable.unit),
+        "comment": printable(variable.comment),
+        "limits": variable.limits,
+        "on_stale": variable.on_stale,
+        "owners": tuple(writer + 1 for writer in owners(variable, cell)),
+    }
 
 
 def split_name(name: str) -> tuple[str, int | None]:

@@ -15,8 +15,7 @@ from gatewayd.links.exports import ExportError
 from gatewayd.links.registry import status_fields
 from gatewayd.mapping.plan import Plan
 from gatewayd.plc.model import Encoding
-from gatewayd.plc.numbers import value_type
-from gatewayd.plc.tags import PlcWishes, members, owners, renamed, split_name, writer_of
+from gatewayd.plc.tags import PlcWishes, members, renamed, split_name, tag_keys, writer_of
 from gatewayd.report.printable import printable
 from gatewayd.report.wording import one_and_more
 
@@ -126,32 +125,11 @@ def _tags(pdo: PdoPlan, node: CanopenPlan, cell: CellDefinition) -> Iterator[Pdo
 
 
 def _tag(item: ObjectPlan, pdo: str, start: int, cell: CellDefinition) -> PdoTag:
-    variable = cell.variables[item.variable]
-    member, element = split_name(variable.name)
-    encoding, kind, arithmetic = None, "BOOL", ""
+    encoding = None
     if item.type is not CanType.BOOLEAN:
-        scale, offset = item.linear or (1.0, 0.0)
-        encoding = Encoding(_TYPES[item.type], "", scale, offset)
-        kind, arithmetic = value_type(variable.kind, encoding.type, scale, offset)
-    return PdoTag(
-        number=variable.number,
-        name=variable.name,
-        member=member,
-        element=element,
-        kind=variable.kind,
-        type=kind,
-        arithmetic=arithmetic,
-        encoding=encoding,
-        unit=printable(variable.unit),
-        comment=printable(variable.comment),
-        limits=variable.limits,
-        on_stale=variable.on_stale,
-        owners=tuple(writer + 1 for writer in owners(variable, cell)),
-        pdo=pdo,
-        start=start,
-        index=item.index,
-        subindex=item.subindex,
-    )
+        encoding = Encoding(_TYPES[item.type], "", *(item.linear or (1.0, 0.0)))
+    keys = tag_keys(cell.variables[item.variable], cell, encoding)
+    return PdoTag(**keys, pdo=pdo, start=start, index=item.index, subindex=item.subindex)
 
 
 def _words(pdo: PdoPlan, cell: CellDefinition) -> Iterator[PdoWord]:

@@ -11,9 +11,7 @@ from gatewayd.links.modbus_server.plan import Placement
 from gatewayd.links.modbus_server.plc.model import RegisterTag
 from gatewayd.modbus.areas import Area
 from gatewayd.plc.model import Encoding
-from gatewayd.plc.numbers import value_type
-from gatewayd.plc.tags import owners, split_name
-from gatewayd.report.printable import printable
+from gatewayd.plc.tags import tag_keys
 
 _READ_ORDER: Final = (Area.HOLDING, Area.INPUT, Area.COIL, Area.DISCRETE)
 _WRITE_ORDER: Final = (Area.HOLDING, Area.COIL)
@@ -38,29 +36,9 @@ def tag_of(place: Placement, cell: CellDefinition) -> RegisterTag:
     variable = cell.variables[place.variable]
     codec = place.codec
     encoding = None if codec is None else Encoding(codec.type, codec.order, codec.scale, codec.offset)
-    member, element = split_name(variable.name)
-    kind, arithmetic = "BOOL", ""
-    if encoding is not None:
-        kind, arithmetic = value_type(variable.kind, encoding.type, encoding.scale, encoding.offset)
-        if kind == "BOOL" and encoding.is_scaled:
-            raise ExportError(
-                f"`{variable.name}` lies in a register of type bool with a scale: strike `scale` and `offset` there"
-            )
-    return RegisterTag(
-        number=variable.number,
-        name=variable.name,
-        member=member,
-        element=element,
-        kind=variable.kind,
-        type=kind,
-        arithmetic=arithmetic,
-        encoding=encoding,
-        bit=place.bit,
-        area=place.area,
-        address=place.address,
-        unit=printable(variable.unit),
-        comment=printable(variable.comment),
-        limits=variable.limits,
-        on_stale=variable.on_stale,
-        owners=tuple(writer + 1 for writer in owners(variable, cell)),
-    )
+    keys = tag_keys(variable, cell, encoding)
+    if encoding is not None and encoding.is_scaled and keys["type"] == "BOOL":
+        raise ExportError(
+            f"`{variable.name}` lies in a register of type bool with a scale: strike `scale` and `offset` there"
+        )
+    return RegisterTag(**keys, bit=place.bit, area=place.area, address=place.address)
