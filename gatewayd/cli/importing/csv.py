@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING
 import click
 
 from gatewayd.cli.files import reason_of
-from gatewayd.cli.importing.defaults import cell_name, cell_options, listen_address
+from gatewayd.cli.importing.defaults import (
+    cell_name,
+    cell_options,
+    listen_address,
+    output_options,
+    strict_option,
+)
 from gatewayd.cli.output import refuse_existing, write_text
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
@@ -61,16 +67,8 @@ Exit codes:
     help="Where the PLC connects to; otherwise port 502, from other machines only if a writer is one.",
 )
 @cell_options
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    metavar="OUT",
-    type=click.Path(dir_okay=False),
-    help="The mapping file to write; standard output otherwise.",
-)
-@click.option("--strict", is_flag=True, help="Doubts count as errors.")
-@click.option("--force", is_flag=True, help="Overwrite OUT if it exists.")
+@output_options
+@strict_option
 @click.pass_context
 def command(
     context: click.Context,

@@ -23,9 +23,35 @@ _CELL_OPTIONS: Final = (
 )
 
 
+_OUTPUT_OPTIONS: Final = (
+    click.option(
+        "-o",
+        "--output",
+        "out",
+        metavar="OUT",
+        type=click.Path(dir_okay=False),
+        help="The mapping file to write; standard output otherwise.",
+    ),
+    click.option("--force", is_flag=True, help="Overwrite OUT if it exists."),
+)
+
+
+def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give an import the options -o and --force."""
+    return _given(command, _OUTPUT_OPTIONS)
+
+
+strict_option: Final = click.option("--strict", is_flag=True, help="Doubts count as errors.")
+"""Gives an import that guesses the option --strict."""
+
+
 def cell_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give an import the options --cell, --series and --version."""
-    for option in reversed(_CELL_OPTIONS):
+    return _given(command, _CELL_OPTIONS)
+
+
+def _given(command: Callable[..., Any], options: Iterable[Callable[..., Any]]) -> Callable[..., Any]:
+    for option in reversed(tuple(options)):
         command = option(command)
     return command
 

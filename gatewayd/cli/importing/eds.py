@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gatewayd.cli.files import reason_of
-from gatewayd.cli.importing.defaults import cell_name
+from gatewayd.cli.importing.defaults import cell_name, output_options, strict_option
 from gatewayd.cli.output import refuse_existing, write_text
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
@@ -52,17 +52,9 @@ Exit codes:
     "--device", metavar="NAME", help="What the mapping calls it; otherwise made of the file's name."
 )
 @click.option("--cell", metavar="NAME", help="Name of the cell; otherwise made of the file's name.")
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    metavar="OUT",
-    type=click.Path(dir_okay=False),
-    help="The mapping file to write; standard output otherwise.",
-)
 @click.option("--leave-out", is_flag=True, help="Write the rest where something cannot be carried over.")
-@click.option("--strict", is_flag=True, help="Doubts count as errors.")
-@click.option("--force", is_flag=True, help="Overwrite OUT if it exists.")
+@output_options
+@strict_option
 @click.pass_context
 def command(
     context: click.Context,

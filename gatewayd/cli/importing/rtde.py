@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gatewayd.cli.files import reason_of
-from gatewayd.cli.importing.defaults import cell_name, cell_options, listen_address
+from gatewayd.cli.importing.defaults import cell_name, cell_options, listen_address, output_options
 from gatewayd.cli.output import refuse_existing, write_text
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
@@ -41,14 +41,6 @@ Exit codes:
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, readable=True))
 @click.option("--host", required=True, metavar="HOST", help="Name or IP address of the robot's controller.")
 @click.option(
-    "-o",
-    "--output",
-    "out",
-    metavar="OUT",
-    type=click.Path(dir_okay=False),
-    help="The mapping file to write; standard output otherwise.",
-)
-@click.option(
     "--recipe", "keys", multiple=True, metavar="KEY", help="Only this recipe; may be given several times."
 )
 @click.option("--writer", metavar="ADDRESS", help="IP address of the PLC that may write the recipe's inputs.")
@@ -61,7 +53,7 @@ Exit codes:
 @click.option("--frequency", metavar="HZ", type=click.FloatRange(0, 500), help="Packages per second.")
 @click.option("--float32", "single", is_flag=True, help="Reals in two registers each; exact ones take four.")
 @click.option("--leave-out", is_flag=True, help="Write the rest where something cannot be carried over.")
-@click.option("--force", is_flag=True, help="Overwrite OUT if it exists.")
+@output_options
 @click.pass_context
 def command(
     context: click.Context,
