@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir
 from hashlib import sha256
+from itertools import chain
 from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
@@ -487,9 +488,9 @@ def _made(extra: ast.expr, module: Sequence[ast.AST]) -> ast.Call:
 
 
 def _returned(call: ast.expr, module: Sequence[ast.AST]) -> list[str]:
-    """The keys of what a function of the same module returns; `...` where they cannot be seen."""
+    """The keys of what a function returns, of the same module or of a base elsewhere; `...`: they cannot be seen."""
     name = ast.unparse(call).removesuffix("()").rpartition(".")[2]
-    for node in module:
+    for node in chain(module, every_node()):
         if isinstance(node, ast.FunctionDef) and node.name == name:
             for inner in ast.walk(node):
                 if isinstance(inner, ast.Return) and isinstance(inner.value, ast.Dict):

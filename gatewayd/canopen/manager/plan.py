@@ -147,3 +147,8 @@ class ManagerPlan:
     sync: SyncPlan = field(default_factory=SyncPlan)
     start_all: bool = False
     """One NMT command starts all devices at once, where all of them are ready."""
+
+    @property
+    def address(self) -> str:
+        """Of the bus: `socketcan:can1`."""
+        return f"{self.interface}:{self.channel}"

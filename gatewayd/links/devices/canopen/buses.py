@@ -113,7 +113,7 @@ class CanopenBuses(SharedPart):
 
     def _bus(self, plan: ManagerPlan) -> _BusAtWork:
         def report(text: str) -> None:
-            log.info("%s", text, extra=fields(bus=f"{plan.interface}:{plan.channel}"))
+            log.info("%s", text, extra=fields(bus=plan.address))
 
         def alive(now: float) -> bool:
             return all(link.core_lives(now) for link in bus.links.values())

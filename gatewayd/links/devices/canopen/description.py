@@ -22,7 +22,7 @@ def describe(plan: DevicePlan, _cell: CellDefinition) -> Description:
     expected = node.expected
     return Description(
         settings={
-            "reached by": f"{plan.bus.interface}:{plan.bus.channel}",
+            "reached by": plan.bus.address,
             "node": str(node.node),
             "vendor": "" if expected.vendor is None else f"0x{expected.vendor:X}",
             "product": "" if expected.product is None else f"0x{expected.product:X}",
@@ -46,7 +46,7 @@ def describe(plan: DevicePlan, _cell: CellDefinition) -> Description:
         },
         places=places,
         address=plan.address,
-        fields={"address": f"{plan.bus.interface}:{plan.bus.channel}", "unit": node.node},
+        fields={"address": plan.bus.address, "unit": node.node},
     )
 
 

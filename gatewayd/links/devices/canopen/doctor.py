@@ -8,10 +8,11 @@ from gatewayd.canopen.bus import BusError
 from gatewayd.canopen.interface import InterfaceReader
 from gatewayd.core.definition import CellDefinition
 from gatewayd.links.devices.canopen.plan import CanopenDevicePlan
+from gatewayd.links.devices.served import served_device
 from gatewayd.links.examination import Examination, Observation, Outcome, Surroundings
 from gatewayd.mapping.plan import LinkPlan
 
-_SERVED = ("good", "partial")
+_REMEDY = "look at its power, its cable, its node-ID and the bit-rate of the bus"
 
 
 class CanopenDeviceExamination(Examination):
@@ -22,21 +23,12 @@ class CanopenDeviceExamination(Examination):
     ) -> AsyncIterator[Observation]:
         """See Examination."""
         assert isinstance(plan, CanopenDevicePlan)
-        for known in around.running:
-            served = known.status.get(plan.name) if known.name == cell.name else None
-            if served:
-                yield _served(str(served.get("state")), str(served.get("reason") or ""))
-                return
+        served = served_device(plan, cell, around, plan.bus.address, _REMEDY)
+        if served is not None:
+            yield served
+            return
         if plan.bus.interface == "socketcan":
             yield interface(plan.bus.channel, plan.bus.bitrate)
-
-
-def _served(state: str, reason: str) -> Observation:
-    text = f"the running gateway has it: {state}"
-    if state in _SERVED:
-        return Observation.well("device", text)
-    remedy = "look at its power, its cable, its node-ID and the bit-rate of the bus"
-    return Observation("device", Outcome.PROBLEM, text, reason or "it does not answer", remedy)
 
 
 def interface(name: str, bitrate: int) -> Observation:

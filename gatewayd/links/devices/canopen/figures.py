@@ -57,7 +57,7 @@ def health_of(link: ManagedDevice, now: float) -> LinkHealth:
     emergency = node.last_emergency if node is not None else None
     own = {
         "family": plan.family,
-        "address": f"{plan.bus.interface}:{plan.bus.channel}",
+        "address": plan.bus.address,
         "unit": plan.node.node,
         "since": round(max(0.0, now - link.state_since[1]), 3),
         "letter": letter.value if letter is not None else "",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
 from gatewayd.canopen.datatypes import Value as Raw
@@ -16,8 +16,7 @@ from gatewayd.canopen.manager.letters import BootError
 from gatewayd.canopen.manager.node import NodeCondition
 from gatewayd.canopen.sdo.client import SdoResult
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import CellDefinition, Direction, Value, Variable
-from gatewayd.core.requester import Requester
+from gatewayd.core.definition import Direction, Value, Variable
 from gatewayd.links.access import AccessError, AccessProblem, PlaceAnswer, PlaceRequest
 from gatewayd.links.canopen_values import fit, limits_of, meaning
 from gatewayd.links.contract import Context, LinkHealth
@@ -27,17 +26,11 @@ from gatewayd.links.devices.canopen.figures import figures_of, health_of, state_
 from gatewayd.links.devices.canopen.managed import ManagedDevice
 from gatewayd.links.devices.canopen.plan import CanopenDevicePlan, ObjectPlace
 from gatewayd.links.devices.family import FamilyRuntime
-from gatewayd.links.devices.inflow import Inflow
-from gatewayd.links.devices.outflow import Outflow
 from gatewayd.links.devices.plan import DevicePlan
 from gatewayd.links.devices.status_words import DeviceState
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
-from gatewayd.mapping.plan import LinkPlan
-from gatewayd.report.wording import names_and_more
 
-PERIOD = 0.05
-"""Seconds between two looks at what only time brings."""
 LAST_SYNCHRONOUS = 240
 """Transmission types up to it are synchronous."""
 _ASKED_LIMIT: Final = 10.0
@@ -53,30 +46,22 @@ Reading = Callable[[Raw], Value | None]
 class CanopenDeviceLink(ManagedDevice):
     """Joins one device to a cell. `CanopenBuses` puts it into the care of its bus's manager."""
 
-    title = "device"
     plan: CanopenDevicePlan
 
     def __init__(self, plan: CanopenDevicePlan, cell: Cell) -> None:
         self.node, self.manager, self.clash = None, None, ""
         self.heard, self.emergency, self.losses = None, None, 0
         self.state_since = (DeviceState.STARTING, clock.now())
-        self._progress = 0
         self._beat = (-1, 0.0)
         self._latest: dict[int, Value | None] = {}
         """What PDOs have brought that come when a value changes, by variable."""
         self._unread: dict[tuple[int, int], str] = {}
         self._unwritten: dict[tuple[int, int], str] = {}
-        self._bind(plan, cell)
-        self._inflow = Inflow(
-            cell, plan.writer, f"{plan.name} ({plan.address})", self._inputs, plan.lost_after
-        )
-        self._outflow = Outflow(cell, plan.sendings, self._send)
+        super().__init__(plan, cell, f"{plan.name} ({plan.address})")
 
-    def _bind(self, plan: CanopenDevicePlan, cell: Cell) -> None:
-        self.plan, self._cell = plan, cell
-        variables = cell.definition.variables
+    def _bind(self, cell: Cell) -> Collection[int]:
+        plan, variables = self.plan, cell.definition.variables
         inputs = [place for place in plan.places if variables[place.variable].direction is Direction.INPUT]
-        self._inputs = [place.variable for place in inputs]
         self._outputs: dict[int, list[ObjectPlace]] = {}
         for place in plan.places:
             if variables[place.variable].direction is Direction.OUTPUT:
@@ -94,55 +79,17 @@ class CanopenDeviceLink(ManagedDevice):
             for number, pdo in enumerate(plan.node.pdos)
             if pdo.transmission is None or pdo.transmission > LAST_SYNCHRONOUS
         }
-        cell.listeners.append(self._on_image)
+        return [place.variable for place in inputs]
 
-    @property
-    def progress(self) -> int:
-        """Counts while the link's task goes on, whatever the device does."""
-        return self._progress
+    def _renumber(self, indices: Mapping[int, int]) -> None:
+        self._latest = {indices[index]: value for index, value in self._latest.items() if index in indices}
 
-    async def run(self) -> None:
-        """Look at the time until cancelled; everything else is called by the manager."""
-        while True:
-            self._progress += 1
-            self._tick(clock.now())
-            await asyncio.sleep(PERIOD)
-
-    def gap(self, since: float, now: float) -> None:
-        """The process stood still from `since` to `now`."""
-        self._inflow.gap(now - since)
-
-    def departing(self, plan: LinkPlan | None, after: CellDefinition) -> Mapping[Requester, str]:
-        """The device as a writer, where another link takes this one's place."""
-        gone = plan is None and self._inflow.connected and self._inflow.requester.writer is not None
-        return {self._inflow.requester: f"the device {self.plan.name} changes or ends"} if gone else {}
-
-    def release(self, plan: LinkPlan | None, after: CellDefinition, now: float) -> None:
-        """Another link takes the place of this one: what the device owns is released."""
-        if plan is None:
-            self._inflow.lose("the new mapping changes the device", now)
-            self._outflow.lose()
-
-    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
-        """Go on, unnoticed by the device, with the cell that succeeded the present one."""
-        assert isinstance(plan, CanopenDevicePlan)
-        before = self._cell.definition
-        places = {variable.name: index for index, variable in enumerate(cell.definition.variables)}
-        indices = {
-            index: places[variable.name]
-            for index, variable in enumerate(before.variables)
-            if variable.name in places
-        }
-        latest = self._latest
-        self._bind(plan, cell)
-        self._latest = {indices[index]: value for index, value in latest.items() if index in indices}
-        inputs = set(self._inputs)
-        self._inflow.rebind(cell, plan.writer, {old: new for old, new in indices.items() if new in inputs})
-        self._outflow.rebind(cell, plan.sendings, indices)
+    def _is_there(self) -> bool:
+        return self.node is not None and self.node.condition is NodeCondition.OPERATIONAL
 
     def flush(self, now: float) -> None:
         """Have what changed last sent."""
-        self._outflow.update(now)
+        super().flush(now)
         self._hand_over(now)
 
     async def ask(self, request: PlaceRequest) -> PlaceAnswer:
@@ -195,7 +142,7 @@ class CanopenDeviceLink(ManagedDevice):
 
     def node_started(self, now: float) -> None:
         """It is in operation."""
-        log.info("device in operation", extra=fields(**self._names(), found=self._letter()))
+        log.info("device in operation", extra=fields(**self._device_names(), found=self._letter()))
         self._forget()
         self.heard = now
         self._inflow.connect(now)
@@ -204,7 +151,7 @@ class CanopenDeviceLink(ManagedDevice):
 
     def node_ended(self, reason: str, now: float) -> None:
         """It is lost as a writer, and nothing is sent to it."""
-        log.warning("device lost", extra=fields(**self._names(), reason=reason))
+        log.warning("device lost", extra=fields(**self._device_names(), reason=reason))
         self.losses += 1
         self._forget()
         self._inflow.lose(reason, now)
@@ -233,7 +180,8 @@ class CanopenDeviceLink(ManagedDevice):
         self.heard = now
         if self._unread.pop((index, subindex), None) is not None:
             log.info(
-                "device is read again", extra=fields(**self._names(), object=object_text(index, subindex))
+                "device is read again",
+                extra=fields(**self._device_names(), object=object_text(index, subindex)),
             )
         found = []
         for variable, reading, pdo in self._by_object.get((index, subindex), ()):
@@ -248,12 +196,13 @@ class CanopenDeviceLink(ManagedDevice):
         found = self._by_object.get((index, subindex), ())
         if all(pdo is not None for _, _, pdo in found):
             return  # a PDO brings it
-        variables = self._cell.definition.variables
-        names = names_and_more([variables[variable].name for variable, _, _ in found])
+        names = self._called([variable for variable, _, _ in found])
         text = f"{names} cannot be read: {reason}"
         if self._unread.get((index, subindex)) != text:
             self._unread[index, subindex] = text
-            log.warning("device is not read", extra=fields(**self._names(), values=names, reason=reason))
+            log.warning(
+                "device is not read", extra=fields(**self._device_names(), values=names, reason=reason)
+            )
 
     def object_unwritten(self, index: int, subindex: int, reason: str, now: float) -> None:
         """The device did not take a value."""
@@ -262,7 +211,7 @@ class CanopenDeviceLink(ManagedDevice):
         if self._unwritten.get((index, subindex)) != text:
             self._unwritten[index, subindex] = text
             log.warning(
-                "device did not take a value", extra=fields(**self._names(), object=at, reason=reason)
+                "device did not take a value", extra=fields(**self._device_names(), object=at, reason=reason)
             )
 
     def object_written(self, index: int, subindex: int, now: float) -> None:
@@ -274,14 +223,14 @@ class CanopenDeviceLink(ManagedDevice):
         """It reports an error, or that it has gone."""
         self.emergency = None if message.is_reset else message
         level = logging.INFO if message.is_reset else logging.WARNING
-        log.log(level, "device reports", extra=fields(**self._names(), emergency=str(message)))
+        log.log(level, "device reports", extra=fields(**self._device_names(), emergency=str(message)))
 
     def boot_failed(self, letter: BootError, detail: str, now: float) -> None:
         """It cannot be taken into operation; said once for each reason."""
         reason = f"{letter.value} {letter.words}: {detail}"
         if reason != self._failed:
             self._failed = reason
-            log.warning("device is not in operation", extra=fields(**self._names(), reason=reason))
+            log.warning("device is not in operation", extra=fields(**self._device_names(), reason=reason))
 
     # -- inside --------------------------------------------------------------------------------------------------
 
@@ -301,20 +250,10 @@ class CanopenDeviceLink(ManagedDevice):
         state = state_of(self)[0]
         if state is not self.state_since[0]:
             self.state_since = (state, now)
-        late = self._inflow.expire(now)
-        if late and self.node is not None and self.node.condition is NodeCondition.OPERATIONAL:
-            variables = self._cell.definition.variables
-            values = names_and_more([variables[index].name for index in late])
-            log.warning("values of a device are lost", extra=fields(**self._names(), values=values))
+        self._give_up_late(now)
         self._outflow.tick(now)
         self._hand_over(now)
         self._cell.health.tables.setdefault("devices", {})[self.plan.number] = figures_of(self, now).words
-
-    def _on_image(self, direction: Direction) -> None:
-        if direction is Direction.OUTPUT:
-            now = clock.now()
-            self._outflow.update(now)
-            self._hand_over(now)
 
     def _hand_over(self, now: float) -> None:
         """Have what was written together sent together."""
@@ -332,9 +271,6 @@ class CanopenDeviceLink(ManagedDevice):
                 self.node.write_pdo(place.pdo, place.item, raw, now)
             else:
                 self.node.write_object(place.index, place.subindex, place.type.pack(raw), now)
-
-    def _names(self) -> dict[str, object]:
-        return {"cell": self._cell.definition.name, "device": self.plan.name}
 
 
 def reading_of(place: ObjectPlace, variable: Variable) -> Reading:

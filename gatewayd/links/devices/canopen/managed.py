@@ -5,12 +5,12 @@ from __future__ import annotations
 from gatewayd.canopen.manager.emergency_text import EmergencyMessage
 from gatewayd.canopen.manager.node import ManagedNode, NodeObserver
 from gatewayd.canopen.manager.runtime import Manager
-from gatewayd.links.contract import Link
 from gatewayd.links.devices.canopen.plan import CanopenDevicePlan
+from gatewayd.links.devices.link import DeviceLink
 from gatewayd.links.devices.status_words import DeviceState
 
 
-class ManagedDevice(Link, NodeObserver):
+class ManagedDevice(DeviceLink, NodeObserver):
     """The link to one device of one cell."""
 
     plan: CanopenDevicePlan

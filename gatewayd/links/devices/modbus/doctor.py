@@ -11,6 +11,7 @@ from pathlib import Path
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.links.devices.modbus.plan import LineAddress, ModbusDevicePlan
+from gatewayd.links.devices.served import served_device
 from gatewayd.links.examination import Examination, Observation, Outcome, Surroundings
 from gatewayd.links.route import look_up_route
 from gatewayd.loop.retry import reason_of
@@ -18,7 +19,7 @@ from gatewayd.mapping.plan import LinkPlan
 
 _PATIENCE = 3.0
 """Seconds for a connection."""
-_SERVED = ("good", "partial")
+_REMEDY = "look at its power, its cable and its unit id; `gatewayd trace` shows what is sent"
 
 
 class ModbusDeviceExamination(Examination):
@@ -29,11 +30,10 @@ class ModbusDeviceExamination(Examination):
     ) -> AsyncIterator[Observation]:
         """See Examination."""
         assert isinstance(plan, ModbusDevicePlan)
-        for known in around.running:
-            served = known.status.get(plan.name) if known.name == cell.name else None
-            if served and served.get("address") == plan.line.text:
-                yield _served(str(served.get("state")), str(served.get("reason") or ""))
-                return
+        served = served_device(plan, cell, around, plan.line.text, _REMEDY)
+        if served is not None:
+            yield served
+            return
         if plan.line.is_serial:
             yield serial_port(plan.line)
             return
@@ -43,14 +43,6 @@ class ModbusDeviceExamination(Examination):
                 if found.outcome is Outcome.PROBLEM:
                     return
         yield await _connection(plan.line)
-
-
-def _served(state: str, reason: str) -> Observation:
-    text = f"the running gateway has it: {state}"
-    if state in _SERVED:
-        return Observation.well("device", text)
-    remedy = "look at its power, its cable and its unit id; `gatewayd trace` shows what is sent"
-    return Observation("device", Outcome.PROBLEM, text, reason or "it does not answer", remedy)
 
 
 def serial_port(line: LineAddress) -> Observation:

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
-from collections.abc import Hashable, Mapping
+from collections.abc import Collection, Hashable
 from typing import Final
 
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import CellDefinition, Direction, Value
-from gatewayd.core.requester import Requester
+from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.links.access import AccessError, AccessProblem, PlaceAnswer, PlaceRequest
-from gatewayd.links.contract import Context, Link, LinkHealth
+from gatewayd.links.contract import Context, LinkHealth
 from gatewayd.links.devices.family import FamilyRuntime
-from gatewayd.links.devices.inflow import Inflow
+from gatewayd.links.devices.link import DeviceLink
 from gatewayd.links.devices.modbus.asking import ask_place, exchange
 from gatewayd.links.devices.modbus.lines import ModbusLines
 from gatewayd.links.devices.modbus.orders import OrderMaker
 from gatewayd.links.devices.modbus.plan import ModbusDevicePlan
 from gatewayd.links.devices.modbus.polls import AnswerReader, polls_of
-from gatewayd.links.devices.outflow import Outflow
 from gatewayd.links.devices.plan import DevicePlan
 from gatewayd.links.devices.status_words import DeviceFigures, DeviceState
 from gatewayd.logs.records import fields
@@ -32,31 +29,23 @@ from gatewayd.modbus.client.identity import UnitIdentity
 from gatewayd.modbus.client.requests import ExceptionAnswer, Failure
 from gatewayd.modbus.client.station import Station
 from gatewayd.modbus.client.unit import StationSettings, UnitState
-from gatewayd.report.wording import names_and_more
 
-PERIOD = 0.05
-"""Seconds between two looks at what only time brings."""
 _ASKED_LIMIT: Final = 5.0
 """Seconds for a request by hand, with its time in the queue of the line."""
 
 log = logging.getLogger("gatewayd.devices")
 
 
-class ModbusDeviceLink(Link):
+class ModbusDeviceLink(DeviceLink):
     """Joins one device to a cell. Its line has the connection, and calls it as the listener of its station."""
 
-    title = "device"
     plan: ModbusDevicePlan
 
     def __init__(self, plan: ModbusDevicePlan, cell: Cell) -> None:
-        self._progress = self._answers = 0
+        self._answers = 0
         self._heard: float | None = None
         self._state_since = (DeviceState.STARTING, clock.now())
-        self._bind(plan, cell)
-        inputs = [placed.variable for placed in plan.inputs(cell.definition)]
-        peer = f"{plan.name} ({plan.line.text} unit {plan.unit})"
-        self._inflow = Inflow(cell, plan.writer, peer, inputs, plan.lost_after)
-        self._outflow = Outflow(cell, plan.sendings, self._send)
+        super().__init__(plan, cell, f"{plan.name} ({plan.line.text} unit {plan.unit})")
         self._unread: dict[tuple[Area, int], str] = {}
         """Groups that the device refuses to be read, or that cannot be read, by area and address; and why."""
         self._unwritten: dict[Hashable, str] = {}
@@ -72,64 +61,29 @@ class ModbusDeviceLink(Link):
     def _new_station(self) -> Station:
         return Station(settings_of(self.plan, self._cell.definition), self)
 
-    def _bind(self, plan: ModbusDevicePlan, cell: Cell) -> None:
-        self.plan, self._cell = plan, cell
-        self._reader = AnswerReader(plan.inputs(cell.definition))
-        self._orders = OrderMaker(plan.outputs(cell.definition), plan.write)
-        cell.listeners.append(self._on_image)
+    def _bind(self, cell: Cell) -> Collection[int]:
+        inputs = self.plan.inputs(cell.definition)
+        self._reader = AnswerReader(inputs)
+        self._orders = OrderMaker(self.plan.outputs(cell.definition), self.plan.write)
+        return [placed.variable for placed in inputs]
 
-    @property
-    def progress(self) -> int:
-        """Counts while the link's task goes on, whatever the device does."""
-        return self._progress
+    def _is_there(self) -> bool:
+        return self.station.state is UnitState.ONLINE
 
     @property
     def reachable(self) -> bool | None:
         """While the device answers, if it is a writer."""
         return None if self.plan.writer is None else self.station.state is UnitState.ONLINE
 
-    def gap(self, since: float, now: float) -> None:
-        """The process stood still: answers that are read now may have waited."""
-        self._inflow.gap(now - since)
-
-    async def run(self) -> None:
-        """Look at the time until cancelled; everything else is called by the line."""
-        while True:
-            self._progress += 1
-            self._tick(clock.now())
-            await asyncio.sleep(PERIOD)
-
-    def departing(self, plan: LinkPlan | None, after: CellDefinition) -> Mapping[Requester, str]:
-        """The device as a writer, where another link takes this one's place."""
-        gone = plan is None and self._inflow.connected and self._inflow.requester.writer is not None
-        return {self._inflow.requester: "the device changes in the new mapping, or ends"} if gone else {}
-
     def release(self, plan: LinkPlan | None, after: CellDefinition, now: float) -> None:
-        """Another link takes the place of this one: what the device owns is released."""
-        if plan is None:
-            self._ended = True
-            self._inflow.lose("the new mapping changes the device", now)
-            self._outflow.lose()
+        """Another link takes the place of this one, and what the line still says is of no interest."""
+        self._ended = self._ended or plan is None
+        super().release(plan, after, now)
 
     def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
-        """Go on, unnoticed by the device, with the cell that succeeded the present one."""
-        assert isinstance(plan, ModbusDevicePlan)
-        before = self._cell.definition
-        places = {variable.name: index for index, variable in enumerate(cell.definition.variables)}
-        indices = {
-            index: places[variable.name]
-            for index, variable in enumerate(before.variables)
-            if variable.name in places
-        }
-        self._bind(plan, cell)
-        inputs = {placed.variable for placed in plan.inputs(cell.definition)}
-        self._inflow.rebind(cell, plan.writer, {old: new for old, new in indices.items() if new in inputs})
-        self._outflow.rebind(cell, plan.sendings, indices)
+        """Go on with the cell that succeeded the present one."""
+        super().rebind(plan, cell, now)
         self._publish(now)
-
-    def flush(self, now: float) -> None:
-        """Have what changed last ready to be sent."""
-        self._outflow.update(now)
 
     def health(self) -> LinkHealth:
         """Whether it answers, and to everything."""
@@ -185,7 +139,9 @@ class ModbusDeviceLink(Link):
     def values_read(self, group: ReadGroup, data: bytes, now: float) -> None:
         """An answer has come."""
         if self._unread.pop((group.area, group.address), None) is not None:
-            log.info("device is read again", extra=fields(**self._names(), values=self._variables(group)))
+            log.info(
+                "device is read again", extra=fields(**self._device_names(), values=self._variables(group))
+            )
         self._inflow.receive(self._reader.values(group, data), now)
 
     def read_failed(self, group: ReadGroup, failure: Failure, now: float) -> None:
@@ -195,7 +151,7 @@ class ModbusDeviceLink(Link):
             self._unread[key] = reason
             values = self._variables(group)
             log.warning(
-                "device is not read", extra=fields(**self._names(), values=values, reason=failure.text)
+                "device is not read", extra=fields(**self._device_names(), values=values, reason=failure.text)
             )
 
     def write_done(self, key: Hashable, failure: Failure | None, now: float) -> None:
@@ -212,7 +168,7 @@ class ModbusDeviceLink(Link):
             self._unwritten[key] = reason
             log.warning(
                 "device did not take a value",
-                extra=fields(**self._names(), variable=name, reason=failure.text),
+                extra=fields(**self._device_names(), variable=name, reason=failure.text),
             )
 
     def state_changed(self, state: UnitState, reason: str, now: float) -> None:
@@ -222,10 +178,10 @@ class ModbusDeviceLink(Link):
         self._unread.clear()
         self._unwritten.clear()
         if state is UnitState.ONLINE:
-            log.info("device answers", extra=fields(**self._names()))
+            log.info("device answers", extra=fields(**self._device_names()))
             self._outflow.connect(now)
         else:
-            log.warning("device lost", extra=fields(**self._names(), reason=reason))
+            log.warning("device lost", extra=fields(**self._device_names(), reason=reason))
             self._inflow.lose(reason, now)
             self._outflow.lose()
         self._publish(now)
@@ -239,7 +195,8 @@ class ModbusDeviceLink(Link):
         changes = [] if former is None else identity.changes(former)
         if changes:
             log.warning(
-                "another device has taken its place", extra=fields(**self._names(), detail=", ".join(changes))
+                "another device has taken its place",
+                extra=fields(**self._device_names(), detail=", ".join(changes)),
             )
 
     # -- inside --------------------------------------------------------------------------------------------------
@@ -250,11 +207,7 @@ class ModbusDeviceLink(Link):
             self._state_since = (state, now)
         # Timers come after sockets: whatever waited there has been read by now.
         self._inflow.caught_up()
-        late = self._inflow.expire(now)
-        if late and self.station.state is UnitState.ONLINE:
-            variables = self._cell.definition.variables
-            values = names_and_more([variables[index].name for index in late])
-            log.warning("values of a device are lost", extra=fields(**self._names(), values=values))
+        self._give_up_late(now)
         self._outflow.tick(now)
         heard = self.station.counters.answers + self.station.counters.exceptions.total()
         if heard != self._answers:
@@ -265,21 +218,13 @@ class ModbusDeviceLink(Link):
         """Put what the status block has of the device where it takes it from."""
         self._cell.health.tables.setdefault("devices", {})[self.plan.number] = self._figures(now).words
 
-    def _on_image(self, direction: Direction) -> None:
-        if direction is Direction.OUTPUT:
-            self._outflow.update(clock.now())
-
     def _send(self, variable: int, _value: Value) -> None:
         now = clock.now()
         for key, order in self._orders.orders(variable, self._cell.image.values):
             self.station.write(key, order, now)
 
     def _variables(self, group: ReadGroup) -> str:
-        variables = self._cell.definition.variables
-        return names_and_more([variables[index].name for index in self._reader.variables(group)])
-
-    def _names(self) -> dict[str, object]:
-        return {"cell": self._cell.definition.name, "device": self.plan.name}
+        return self._called(self._reader.variables(group))
 
 
 def settings_of(plan: ModbusDevicePlan, cell: CellDefinition) -> StationSettings:

@@ -24,11 +24,17 @@ async def seen(*running: Any) -> list[tuple[str, Outcome]]:
 
 
 async def test_running_gateway_is_asked_first() -> None:
-    good = SimpleNamespace(name="press", status={"encoder": {"state": "good"}})
-    lost = SimpleNamespace(name="press", status={"encoder": {"state": "lost", "reason": "B no answer"}})
+    bus = the_device(planned()).bus.address
+    elsewhere = SimpleNamespace(
+        name="press", status={"encoder": {"state": "good", "address": "socketcan:can7"}}
+    )
+    good = SimpleNamespace(name="press", status={"encoder": {"state": "good", "address": bus}})
+    lost = SimpleNamespace(
+        name="press", status={"encoder": {"state": "lost", "address": bus, "reason": "B no answer"}}
+    )
     assert await seen(good) == [("the running gateway has it: good", Outcome.OK)]
     assert await seen(lost) == [("the running gateway has it: lost", Outcome.PROBLEM)]
-    assert await seen() == []
+    assert await seen() == await seen(elsewhere) == []
 
 
 @pytest.mark.parametrize(
