@@ -71,14 +71,3 @@ class MetricValue:
 def quality_property(quality: QualityCode) -> tuple[str, PropertyValue]:
     """As a payload has it: an Int32 (tck-id-payloads-propertyset-quality-value-type)."""
     return QUALITY, PropertyValue(MetricType.INT32, value=encode_value(MetricType.INT32, quality))
-
-
-def same_when_lowered(names: list[str]) -> list[str]:
-    """Those that differ from an earlier one in case alone (tck-id-case-sensitivity-metric-names, -sparkplug-ids)."""
-    seen: set[str] = set()
-    found = []
-    for name in names:
-        if name.lower() in seen:
-            found.append(name)
-        seen.add(name.lower())
-    return found

@@ -156,8 +156,10 @@ class LiveNode(EdgeNodeUser):
             self._client.disconnect(code)
         else:
             self._client.disconnect()
-        for _ in range(5):
-            self._client.loop(0.005)
+        # It sends a packet at a time, the DISCONNECT last.
+        for _ in range(500):
+            if self._client.loop(0.005) != paho.MQTT_ERR_SUCCESS:
+                break
         self._gone()
 
     def _gone(self) -> None:

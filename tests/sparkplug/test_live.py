@@ -14,6 +14,7 @@ from gatewayd.sparkplug.declarations import QualityCode
 from gatewayd.sparkplug.states import EdgeNodeState
 from tests.peers.mosquitto import Mosquitto, mosquitto
 from tests.peers.tahu import tahu_host
+from tests.sparkplug.conformance.cases import tck
 from tests.sparkplug.live import LiveNode, paho, utc
 
 schema = pytest.importorskip("tests.sparkplug.schema")
@@ -60,6 +61,11 @@ def is_online(live: LiveNode) -> bool:
     return live.node.state is EdgeNodeState.ONLINE
 
 
+@tck(
+    "principles-persistence-clean-session-311",
+    "operational-behavior-edge-node-intentional-disconnect-packet",
+    "payloads-ndeath-will-message",
+)
 def test_a_broker_publishes_the_will_and_no_second_death_of_a_node_that_said_good_bye(tmp_path: Path) -> None:
     with mosquitto(tmp_path) as broker, watched(broker) as watcher:
         live = LiveNode(broker, next_bd_seq=255)
@@ -77,6 +83,10 @@ def test_a_broker_publishes_the_will_and_no_second_death_of_a_node_that_said_goo
         broker.wait_for_line("Will message specified", "(r0, q1)")
 
 
+@tck(
+    "principles-persistence-clean-session-50",
+    "payloads-ndeath-will-message-publisher-disconnect-mqtt50",
+)
 def test_with_mqtt_5_the_session_is_clean_and_disconnect_says_with_will(tmp_path: Path) -> None:
     with mosquitto(tmp_path) as broker, watched(broker) as watcher:
         live = LiveNode(broker, version=5)
