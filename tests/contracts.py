@@ -43,8 +43,10 @@ from gatewayd.mapping.loader import load, load_together
 from gatewayd.mapping.rules import catalogue
 from gatewayd.mapping.schema import mapping_schema
 from gatewayd.report.schema import documented
+from gatewayd.web.access_control import AccessControl
 from gatewayd.web.listener import StatusListener
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS
+from gatewayd.web.settings import settings
 from tests.sources import MODULES, PACKAGE, ROOT, every_node, nodes
 
 GOLDEN = ROOT / "tests" / "golden" / "contracts"
@@ -314,7 +316,7 @@ def metrics() -> object:
 def control() -> object:
     """Fields and routes of the control interface, and the routes of the status listener."""
     anything = MagicMock()
-    listener = StatusListener("127.0.0.1", 0, anything, api=(anything, None))
+    listener = StatusListener(AccessControl(settings("127.0.0.1:0")), anything, api=(anything, None))
     return {
         "fields": {name.upper(): list(fields) for name, fields in documented().items()},
         "socket": sorted(_routes(application(anything, None))),

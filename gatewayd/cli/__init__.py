@@ -27,6 +27,7 @@ COMMANDS = {
     "trace": "Print the traffic on the links of the running gateway, decoded.",
     "force": "Force a variable to a value, for commissioning.",
     "unforce": "End a force before its time.",
+    "token": "Make, list and revoke tokens for the status page and its API.",
     "rtde": "Work with a robot's RTDE interface, without a mapping.",
     "import": "Make a mapping from a register list, data sheet or recipe.",
     "completion": "Print the completion script of a shell.",

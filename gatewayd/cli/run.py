@@ -76,7 +76,36 @@ Exit codes:
     "--token-file",
     type=click.Path(path_type=Path),
     envvar="GATEWAYD_TOKEN_FILE",
-    help="File with the token that the status listener demands for everything but reading.",
+    help="File of tokens (`gatewayd token`): what the status listener asks for where anything is changed, and beyond "
+    "loopback for reading.",
+)
+@click.option(
+    "--status-certificate",
+    type=click.Path(path_type=Path),
+    envvar="GATEWAYD_STATUS_CERTIFICATE",
+    help="TLS certificate of the status listener with those of its issuers (PEM); beyond loopback it needs one.",
+)
+@click.option(
+    "--status-key",
+    type=click.Path(path_type=Path),
+    envvar="GATEWAYD_STATUS_KEY",
+    help="Private key of that certificate (PEM, not encrypted).",
+)
+@click.option(
+    "--status-name",
+    "names",
+    metavar="NAME",
+    multiple=True,
+    envvar="GATEWAYD_STATUS_NAME",
+    help="A name by which browsers call the status listener, beside its address and localhost; may be repeated.",
+)
+@click.option(
+    "--status-proxy",
+    "proxy",
+    metavar="ADDRESS",
+    envvar="GATEWAYD_STATUS_PROXY",
+    help="Address of a reverse proxy that ends TLS in front of the status listener, and names its clients in "
+    "X-Forwarded-For.",
 )
 @click.pass_obj
 def command(
@@ -90,6 +119,10 @@ def command(
     audit: Path | None,
     status: str | None,
     token_file: Path | None,
+    status_certificate: Path | None,
+    status_key: Path | None,
+    names: tuple[str, ...],
+    proxy: str | None,
     strict: bool,
 ) -> int:
     """Serve the robot cells of mapping FILES until stopped.
@@ -101,7 +134,7 @@ def command(
     from gatewayd.service.main import main
     from gatewayd.service.options import Options
 
-    page = _settings(status, token_file)
+    page = _settings(status, token_file, status_certificate, status_key, names, proxy)
     options = Options(files, state, control, audit, page, strict=strict)
     with ExitStack() as log:
         return main(options, lambda: _configure(log, log_format, log_level), early)
@@ -118,18 +151,28 @@ def _configure(log: ExitStack, form: str, level: str) -> None:
     log.callback(logging.shutdown)  # lines that were merged are written before the stream ends
 
 
-def _settings(status: str | None, token_file: Path | None) -> Settings | None:
+def _settings(  # noqa: PLR0917 - one for each option
+    status: str | None,
+    token_file: Path | None,
+    certificate: Path | None,
+    key: Path | None,
+    names: tuple[str, ...],
+    proxy: str | None,
+) -> Settings | None:
     if not status:
-        if token_file is not None:
-            raise click.UsageError(
-                f"the token in {token_file} protects the status listener, and there is none: "
-                "add --status 127.0.0.1:9502 (GATEWAYD_STATUS), or leave --token-file (GATEWAYD_TOKEN_FILE) out"
-            )
+        given = {"--token-file": token_file, "--status-certificate": certificate, "--status-key": key}
+        for option, path in given.items():
+            if path is not None:
+                variable = f"GATEWAYD_{option.removeprefix('--').replace('-', '_').upper()}"
+                raise click.UsageError(
+                    f"{option} {path} is for the status listener, and there is none: "
+                    f"add --status 127.0.0.1:9502 (GATEWAYD_STATUS), or leave {option} ({variable}) out"
+                )
         return None
-    from gatewayd.web.settings import Settings, SettingsError
+    from gatewayd.web.settings import SettingsError, settings
 
     try:
-        return Settings(status, token_file)
+        return settings(status, token_file, certificate, key, names, proxy)
     except SettingsError as error:
         raise click.UsageError(str(error)) from error
 

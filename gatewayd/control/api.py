@@ -16,6 +16,7 @@ from typing import Any, Protocol, TypeVar
 from gatewayd import __version__
 from gatewayd.audit.record import Record, utc
 from gatewayd.audit.trail import Audit
+from gatewayd.control.access import Caller
 from gatewayd.control.names import NamePattern
 from gatewayd.control.packages import PackageFeeds
 from gatewayd.control.trace import TracedGateway, Traces
@@ -232,36 +233,39 @@ class Api:
                 503, "stood_still", f"the gateway stood still for {seconds:.1f} s; repeat the command"
             )
 
-    def take(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> LockStatus:
+    def take(self, name: str, body: Mapping[str, Any], caller: Caller, moment: Moment) -> LockStatus:
         """Take a lock; `for` seconds, or until it is released. The lock as it is then."""
         runtime, lock = self._lock(name, body)
         seconds = _seconds(body, required=False)
-        runtime.cell.operator.take_lock(lock, moment.now, moment.now + seconds, who)
+        until = moment.now + seconds
+        runtime.cell.operator.take_lock(lock, moment.now, until, caller.detail, caller.holder)
         return lock_view(runtime.cell, lock, moment.now)
 
-    def release(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> LockStatus:
+    def release(self, name: str, body: Mapping[str, Any], caller: Caller, moment: Moment) -> LockStatus:
         """Release a lock of any owner. The lock as it is then."""
         runtime, lock = self._lock(name, body)
-        if not runtime.cell.operator.free_lock(lock, moment.now, who):
+        if not runtime.cell.operator.free_lock(lock, moment.now, caller.detail):
             raise ApiError(409, "not_owned", f"nobody owns {name}")
         return lock_view(runtime.cell, lock, moment.now)
 
-    def force(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+    def force(self, name: str, body: Mapping[str, Any], caller: Caller, moment: Moment) -> Json:
         """Force a variable to `value` `for` some seconds. The variable as it is then."""
         runtime, index = self._variable(name, body)
         cell = runtime.cell
         variable = cell.definition.variables[index]
         value = _value(variable.kind, body.get("value"))
         seconds = _seconds(body, required=True)
-        refusal = cell.operator.force(index, value, moment.now, moment.now + seconds, who)
+        refusal = cell.operator.force(
+            index, value, moment.now, moment.now + seconds, caller.detail, caller.holder
+        )
         if refusal is not None:
             raise ApiError(409, _CODES[refusal.reason], f"{name} cannot be forced: {_why(refusal, runtime)}")
         return self._view(runtime, index, moment)
 
-    def unforce(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+    def unforce(self, name: str, body: Mapping[str, Any], caller: Caller, moment: Moment) -> Json:
         """End a force. The variable as it is then."""
         runtime, index = self._variable(name, body)
-        if not runtime.cell.operator.unforce(index, moment.now, who):
+        if not runtime.cell.operator.unforce(index, moment.now, caller.detail):
             raise ApiError(409, "not_forced", f"{name} is not forced")
         return self._view(runtime, index, moment)
 

@@ -17,6 +17,7 @@ from typing import Any
 from aiohttp import web
 from aiohttp.typedefs import Middleware
 
+from gatewayd.control.access import Caller, Role, local_caller
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.devices import devices_by_hand
 from gatewayd.control.endpoint import Reload
@@ -45,11 +46,17 @@ _BODY_TIME = 5.0
 _WRITE_TIME = 30.0
 """Seconds for which a follower may leave what it asked for unread."""
 _PEER_CREDENTIALS = struct.Struct("iII")
+CALLER = web.RequestKey("CALLER", Caller)
+"""In a request that came over the network: who asks, if its listener knows."""
+IS_CURRENT: web.RequestKey[Callable[[], bool]] = web.RequestKey("IS_CURRENT")
+"""In such a request: whether an answer without end may go on."""
+PEER = web.RequestKey("PEER", str)
+"""In such a request: the address that it came from, which is a proxy's client's where there is a proxy."""
 
 log = logging.getLogger("gatewayd.control")
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
-_Act = Callable[[str, Mapping[str, Any], str, Moment], Mapping[str, object]]
+_Act = Callable[[str, Mapping[str, Any], Caller, Moment], Mapping[str, object]]
 _Ask = Callable[[str, Mapping[str, Any], str], Awaitable[Mapping[str, object]]]
 _Question = Callable[[Mapping[str, str], Moment], Generator[None, None, Mapping[str, object]]]
 
@@ -88,14 +95,14 @@ def application(api: Api, reload: Reload | None) -> web.Application:
     for name, question in questions.items():
         found.router.add_get(f"/v1/{name}", routes.answer(question))
     found.router.add_get("/v1/events", routes.events)
-    acts: dict[str, _Act] = {
-        "locks/{name}/take": api.take,
-        "locks/{name}/release": api.release,
-        "variables/{name}/force": api.force,
-        "variables/{name}/unforce": api.unforce,
+    acts: dict[str, tuple[_Act, Role]] = {
+        "locks/{name}/take": (api.take, Role.OPERATOR),
+        "locks/{name}/release": (api.release, Role.OPERATOR),
+        "variables/{name}/force": (api.force, Role.ENGINEER),
+        "variables/{name}/unforce": (api.unforce, Role.ENGINEER),
     }
-    for name, act in acts.items():
-        found.router.add_post(f"/v1/{name}", routes.act(act))
+    for name, (act, role) in acts.items():
+        found.router.add_post(f"/v1/{name}", routes.act(act, role))
     found.router.add_post("/v1/reload", routes.reload)
     return found
 
@@ -144,27 +151,26 @@ class _Routes:
         subject = request.path, tuple(sorted(query.items()))
         return _response(await self._api.share.done_once(subject, asker(request), work))
 
-    def act(self, act: _Act) -> _Handler:
+    def act(self, act: _Act, role: Role) -> _Handler:
         async def handle(request: web.Request) -> web.StreamResponse:
             self._api.refuse_what_waited()
-            body, who = await _body(request), await _who(request)
+            body, caller = await _body(request), await _allowed(request, role)
             self._api.refuse_what_waited()
-            return _json(act(request.match_info["name"], body, who, _moment()))
+            return _json(act(request.match_info["name"], body, caller, _moment()))
 
         return handle
 
     async def reload(self, request: web.Request) -> web.StreamResponse:
         self._api.refuse_what_waited()
-        body = await _body(request)
+        body, caller = await _body(request), await _allowed(request, Role.ENGINEER)
         force, accept = body.get("force", False), _accepted(body.get("accept", []))
         if not isinstance(force, bool):
             raise ApiError(400, "bad_request", "`force` must be true or false")
         if self._reload is None:
             raise ApiError(501, "no_reload", "this gateway cannot reload: restart it")
-        who = await _who(request)
         self._api.refuse_what_waited()
         kinds = ",".join(sorted(accept)) or None
-        log.info("reload asked for", extra=fields(detail=who, force=force, accept=kinds))
+        log.info("reload asked for", extra=fields(detail=caller.detail, force=force, accept=kinds))
         result = await self._reload(frozenset(ObjectionKind) if force else accept)
         return _json(dict(result.as_object()), 409 if result.exit_code else 200)
 
@@ -203,7 +209,7 @@ class _Routes:
 
         # A follower that is gone, or that leaves too much unread, gets nothing more.
         with suppress(ConnectionError, TimeoutError, Busy):
-            while True:
+            while request.get(IS_CURRENT, _always)():
                 if lines or clock.now() - sent_at >= ALIVE_PERIOD:
                     sent_at = clock.now()
                     async with asyncio.timeout(_WRITE_TIME):
@@ -256,9 +262,9 @@ async def _trace(traces: Traces, share: LoopShare, request: web.Request) -> web.
 async def _ask_device(api: Api, ask: _Ask, request: web.Request) -> web.StreamResponse:
     """Read or write a place of a device, on the connection that the gateway has."""
     api.refuse_what_waited()
-    body, who = await _body(request), await _who(request)
+    body, caller = await _body(request), await _allowed(request, Role.ENGINEER)
     api.refuse_what_waited()
-    return _json(await ask(request.match_info["name"], body, who))
+    return _json(await ask(request.match_info["name"], body, caller.detail))
 
 
 async def _packages(feeds: PackageFeeds, share: LoopShare, request: web.Request) -> web.StreamResponse:
@@ -329,7 +335,7 @@ _BUSY = ApiError(503, "busy", "too many requests at once: try again later, and l
 
 def asker(request: web.Request) -> str:
     """Who gets turns: the address of a peer on the network; all that use the control socket are one."""
-    return request.remote or "control socket"
+    return request.get(PEER) or request.remote or "control socket"
 
 
 def _in_turn(share: LoopShare) -> Middleware:
@@ -345,6 +351,10 @@ def _in_turn(share: LoopShare) -> Middleware:
         return await handler(request)
 
     return in_turn
+
+
+def _always() -> bool:
+    return True
 
 
 def _moment() -> Moment:
@@ -405,15 +415,26 @@ async def _body(request: web.Request) -> dict[str, Any]:
     return found
 
 
-async def _who(request: web.Request) -> str:
-    """Who is at the other end, as the kernel knows it; a peer on the network by its address."""
+async def _allowed(request: web.Request, role: Role) -> Caller:
+    """Who asks, if it has this role. Raises ApiError."""
+    caller: Caller = request.get(CALLER) or await _user(request)
+    if caller.role < role:
+        log.warning("refused for lack of the role", extra=fields(detail=caller.detail, path=request.path))
+        raise ApiError(
+            403, "role", f"this needs the role {role.title}; {caller.holder.title} is {caller.role.title}"
+        )
+    return caller
+
+
+async def _user(request: web.Request) -> Caller:
+    """The user at the other end of the control socket, as the kernel knows it."""
     sock = request.transport.get_extra_info("socket") if request.transport is not None else None
     if sock is None or sock.family != socket.AF_UNIX:
-        return f"from {request.remote}" if request.remote else ""
+        raise ApiError(403, "role", "nobody is known to ask for this")
     raw = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER_CREDENTIALS.size)
     _pid, user, _group = _PEER_CREDENTIALS.unpack(raw)
     # The user database may be on the network, and asyncio's own threads would be waited for at the gateway's end.
-    return f"by {await in_daemon_thread(lambda: _user_name(user), 'user name')}"
+    return local_caller(await in_daemon_thread(lambda: _user_name(user), "user name"))
 
 
 @lru_cache(maxsize=32)

@@ -36,8 +36,8 @@ from gatewayd.report.schema import (
 )
 from gatewayd.report.verdict import CellVerdict, PicturePart, ServedCell, verdict_of
 
-ForceState = tuple[Value, float, tuple[Value, Quality] | None]
-"""The forced value, its time left, and the `truth` beside it."""
+ForceState = tuple[Value, float, tuple[Value, Quality] | None, str]
+"""The forced value, its time left, the `truth` beside it, and who forces it."""
 VariableState = tuple[Value, Quality, float, str | None, float | None, ForceState | None]
 """Value, quality and age, the owner and its lease, the force; None: there is none."""
 _QUALITIES = tuple(quality.name.lower() for quality in Quality)
@@ -215,7 +215,7 @@ def variable_state(served: ServedCell, index: int, now: float) -> VariableState:
         cell.image.age(index, now),
         None if owner is None else cell.definition.writer_name(owner),
         None if lock is None or owner is None else cell.ownership.remaining(lock, now),
-        None if force is None else (force.value, force.until - now, truth(served, index)),
+        None if force is None else (force.value, force.until - now, truth(served, index), force.holder.title),
     )
 
 
@@ -235,12 +235,13 @@ def variable_view(declared: Json, state: VariableState) -> Json:
 
 
 def _forced(force: ForceState) -> Json:
-    value, left, reported = force
+    value, left, reported, holder = force
     return {
         "value": plain_value(value),
         "remaining": _seconds(left),
         "reported": None if reported is None else plain_value(reported[0]),
         "reported_quality": None if reported is None else _QUALITIES[reported[1]],
+        "by": holder or None,
     }
 
 
@@ -257,7 +258,14 @@ def lock_view(cell: Cell, index: int, now: float) -> LockStatus:
         declared_lease=lock.lease,
         owner=None if owner is None else definition.writer_name(owner),
         remaining=None if owner is None else _seconds(cell.ownership.remaining(index, now)),
+        by=holders(cell, index) or None,
     )
+
+
+def holders(cell: Cell, lock: int) -> str:
+    """For whom the operator has this lock; empty: a writer owns it, or nobody, or it is not known."""
+    found = cell.forcing.holders(lock, cell.definition.locks[lock].members)
+    return ", ".join(filter(None, (holder.title for holder in found)))
 
 
 def event_view(cell: Cell, seq: int, event: Event, now: float, wall: float) -> EventMessage:

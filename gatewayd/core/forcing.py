@@ -8,11 +8,30 @@ does; a forced input is FORCED while the robot has it, and says what is wrong (s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from gatewayd.core.definition import Direction, Value
 from gatewayd.core.image import ProcessImage, Quality
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """Who takes and forces as the operator."""
+
+    name: str = ""
+    """Of a user of this machine or of a token; empty: not known."""
+    credential: str = ""
+    """What it acts by from elsewhere, and what it holds ends with; empty: it is on this machine."""
+
+    @property
+    def title(self) -> str:
+        """`anna`, or `token anna`: a user and a token may have the same name."""
+        return f"token {self.name}" if self.credential else self.name
+
+
+LOCAL = Holder()
+"""Somebody on this machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +42,16 @@ class Force:
     since: float
     until: float
     """Monotonic time at which it ends by itself."""
+    holder: Holder = LOCAL
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """A lock that the local operator took."""
+
+    until: float
+    """Monotonic time at which it ends by itself; infinity: when it is released."""
+    holder: Holder = LOCAL
 
 
 class Forcing:
@@ -34,8 +63,8 @@ class Forcing:
         """What lies under the overlay, while it is laid."""
         self.forces: dict[int, Force] = {}
         """By variable."""
-        self.holds: dict[int, float] = {}
-        """Locks that the operator took, and until when; infinity: until they are released."""
+        self.holds: dict[int, Hold] = {}
+        """By lock: those that the operator took."""
         self.next_due = math.inf
         """Nothing ends by itself before this time."""
 
@@ -44,10 +73,10 @@ class Forcing:
         self.forces[variable] = force
         self.next_due = min(self.next_due, force.until)
 
-    def hold(self, lock: int, until: float) -> None:
+    def hold(self, lock: int, hold: Hold) -> None:
         """Note that the operator took a lock."""
-        self.holds[lock] = until
-        self.next_due = min(self.next_due, until)
+        self.holds[lock] = hold
+        self.next_due = min(self.next_due, hold.until)
 
     def reported(self, variable: int) -> tuple[Value, Quality] | None:
         """What the source of a forced output reports meanwhile. None: it is not forced, or an input.
@@ -62,17 +91,28 @@ class Forcing:
         """How long the operator needs the lock of these variables; None: no longer."""
         ends = [self.forces[member].until for member in members if member in self.forces]
         if lock in self.holds:
-            ends.append(self.holds[lock])
+            ends.append(self.holds[lock].until)
         return max(ends, default=None)
+
+    def holders(self, lock: int, members: Iterable[int]) -> list[Holder]:
+        """For whom the operator has the lock of these variables: who took it, then who forces one of them."""
+        found = [self.holds[lock].holder] if lock in self.holds else []
+        found += [self.forces[member].holder for member in members if member in self.forces]
+        return list(dict.fromkeys(found))
+
+    def of(self, ended: Callable[[Holder], bool]) -> tuple[list[int], list[int]]:
+        """The variables that such holders force, and the locks that they took."""
+        variables = [variable for variable, force in self.forces.items() if ended(force.holder)]
+        return variables, [lock for lock, hold in self.holds.items() if ended(hold.holder)]
 
     def due(self, now: float) -> tuple[list[int], list[int]]:
         """The variables whose forces and the locks whose holds have ended. Cheap while nothing can have."""
         if now < self.next_due:
             return [], []
         variables = [variable for variable, force in self.forces.items() if force.until <= now]
-        locks = [lock for lock, until in self.holds.items() if until <= now]
+        locks = [lock for lock, hold in self.holds.items() if hold.until <= now]
         left = [force.until for force in self.forces.values() if force.until > now]
-        left += [until for until in self.holds.values() if until > now]
+        left += [hold.until for hold in self.holds.values() if hold.until > now]
         self.next_due = min(left, default=math.inf)
         return variables, locks
 
@@ -106,6 +146,6 @@ class Forcing:
     def succeed(self, former: Forcing, variables: Mapping[int, int], locks: Mapping[int, int]) -> None:
         """Go on with all that `former` forces and holds; its overlay is lifted, this one's is laid."""
         self.forces.update({variables[index]: force for index, force in former.forces.items()})
-        self.holds.update({locks[lock]: until for lock, until in former.holds.items()})
+        self.holds.update({locks[lock]: hold for lock, hold in former.holds.items()})
         self.next_due = former.next_due
         self.lay()

@@ -1,6 +1,8 @@
 """The local operator: takes and frees locks, and puts values in place of what their sources report.
 
-He stands above every writer: what he takes nobody else gets, whatever lease or priority the mapping declares.
+He stands above every writer: what he takes nobody else gets, whatever lease or priority the mapping declares. Several
+people may act as the operator, each with a `Holder`: none of them is kept from what another one took or forced, but
+what each holds is known, and ends with what it acts by.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from gatewayd.core.definition import OPERATOR, Direction, Value
 from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.fallbacks import Fallbacks
-from gatewayd.core.forcing import Force, Forcing
+from gatewayd.core.forcing import LOCAL, Force, Forcing, Hold, Holder
 from gatewayd.core.image import ProcessImage
 from gatewayd.core.limits import within
 from gatewayd.core.locking import Locking
@@ -40,14 +42,24 @@ class Operator:
     _refuse: Callable[[Requester, Refusal, float, Value], None]
     _notify: Callable[[Direction], None]
 
-    def take_lock(self, lock: int, now: float, until: float = math.inf, detail: str = "") -> None:
+    def take_lock(
+        self, lock: int, now: float, until: float = math.inf, detail: str = "", holder: Holder = LOCAL
+    ) -> None:
         """The local operator takes a lock from its owner; nobody else gets it until `until` or `free_lock`.
 
         Taken from a writer, all its members take their release fallback, as with any takeover; of a free group
-        those do that were only adopted. Taking it again changes `until`.
+        those do that were only adopted. Taking it again changes `until` and the holder.
         """
         self.release_expired(now)
-        self.forcing.hold(lock, until)
+        former = self.forcing.holds.get(lock)
+        self.forcing.hold(lock, Hold(until, holder))
+        if former is not None and former.holder != holder:
+            passed = ", ".join(
+                filter(None, (detail, f"held by {former.holder.title or 'this machine'} before"))
+            )
+            self._record(
+                Event(now, EventKind.TAKEN_OVER, lock=lock, writer=OPERATOR, other=OPERATOR, detail=passed)
+            )
         if self._hold(lock, now, detail):
             self._notify(Direction.INPUT)
 
@@ -65,14 +77,20 @@ class Operator:
             self._locking.free([lock], now, by)
         return True
 
-    def force(
-        self, variable: int, value: Value, now: float, until: float, detail: str = ""
+    def force(  # noqa: PLR0917 - what, until when, and by whom
+        self,
+        variable: int,
+        value: Value,
+        now: float,
+        until: float,
+        detail: str = "",
+        holder: Holder = LOCAL,
     ) -> Refusal | None:
         """The local operator puts `value` in place of what the variable's source reports, at the latest until `until`.
 
         The robot gets a forced input as the operator's, who holds its lock so long; the fieldbus sees a forced output.
         The other members of its lock take their release fallback, as `take_lock` says. Commands cannot be forced.
-        Forcing it again changes value and `until`. Refused like any write: limits, robot, register.
+        Forcing it again changes value, `until` and holder. Refused like any write: limits, robot, register.
         """
         self.release_expired(now)
         declared = self._image.variables[variable]
@@ -94,7 +112,7 @@ class Operator:
             return refusal
         old = self._image.values[variable]
         self.forcing.lift()
-        self.forcing.put(variable, Force(allowed, now, until))
+        self.forcing.put(variable, Force(allowed, now, until, holder))
         if lock is not None:
             self._hold(lock, now, detail, forced=variable)
         event = Event(now, EventKind.FORCED, variable, lock, OPERATOR, old=old, new=allowed, detail=detail)
@@ -122,13 +140,13 @@ class Operator:
 
     def release_expired(self, now: float) -> None:
         """End what time has ended: forces, what the operator took, and leases."""
-        forces, holds = self.forcing.due(now)
-        if forces or holds:
-            for lock in holds:
-                del self.forcing.holds[lock]
-            self._end_forces(forces, now, "time limit")
-            self._settle(holds, now, "time limit")
+        self._end_each(*self.forcing.due(now), now, "time limit")
         self._locking.expire(now)
+
+    def end_of(self, ended: Callable[[Holder], bool], now: float, detail: str) -> bool:
+        """End what these holders took and force, and nothing that another one needs. Whether there was anything."""
+        self.release_expired(now)
+        return self._end_each(*self.forcing.of(ended), now, detail)
 
     def give_forced(self, now: float) -> None:
         """The robot gets what is forced, whatever its inputs held when they were adopted."""
@@ -138,6 +156,15 @@ class Operator:
                 self._give(index, force.value, now)
 
     # -- inside --------------------------------------------------------------------------------------------------
+
+    def _end_each(self, forces: Sequence[int], holds: Sequence[int], now: float, detail: str) -> bool:
+        if not forces and not holds:
+            return False
+        for lock in holds:
+            del self.forcing.holds[lock]
+        self._end_forces(forces, now, detail)
+        self._settle(holds, now, detail)
+        return True
 
     def _give(self, variable: int, value: Value, now: float) -> None:
         self._image.store(variable, value, now)

@@ -51,9 +51,9 @@ class LoopShare:
         self._announced: dict[Hashable, asyncio.Task[object]] = {}
         """Works that wait for their first turn."""
 
-    async def request(self, asker: str) -> None:
-        """A turn for a request that has come, whatever it is: it costs what every request costs. Raises Busy."""
-        async with self._turn(asker, OVERHEAD):
+    async def request(self, asker: str, cost: float = OVERHEAD) -> None:
+        """A turn for what has come, whatever it is: it costs what every request costs, or `cost`. Raises Busy."""
+        async with self._turn(asker, cost):
             pass
 
     async def done(self, asker: str, work: Generator[object, None, _Result]) -> _Result:

@@ -148,7 +148,8 @@ class VariableStatus(TypedDict):
     forced: Annotated[
         Json | None,
         "null, or `value` and `remaining` seconds of a force, and `reported` and `reported_quality`: what the robot "
-        "reports of an output meanwhile, or reads back of an input (null where it does not)",
+        "reports of an output meanwhile, or reads back of an input (null where it does not), and `by` whom: a user of "
+        "this machine, `token NAME`, or null",
     ]
 
 
@@ -163,6 +164,10 @@ class LockStatus(TypedDict):
     declared_lease: Annotated[float | None, "seconds of lease, or null"]
     owner: Annotated[str | None, "name of the owner now, `operator`, or null"]
     remaining: Annotated[float | None, "seconds until the owner loses it without renewing, or null"]
+    by: Annotated[
+        str | None,
+        "for whom the operator has it: a user of this machine, `token NAME`, several with commas; or null",
+    ]
 
 
 class EventMessage(TypedDict):

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import math
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from gatewayd.service.signals import SIGNALS, Effect, name_of
 from gatewayd.service.startup import Startup, state_directory
 from gatewayd.service.systemd import Notifier
 from gatewayd.service.watchdog import ManagerReporter
+from gatewayd.web.access_control import AccessControl
 from gatewayd.web.launch import serve
 
 QUIET = 10.0
@@ -47,11 +49,12 @@ async def _serve(daemon: Daemon, found: Startup, options: Options) -> None:
         return
     standstill = Standstill()
     clock.on_gap(standstill.gap)
+    network = AccessControl(options.page, lambda: daemon.cells) if options.page is not None else None
     access = OperatorAccess(
         daemon,
         control,
         options.audit,
-        lambda: reporter.notes,
+        lambda: (*reporter.notes, *_troubles(network)),
         lambda accept: reloader.reload(accept=accept),
         stood_still=standstill.seconds,
     )
@@ -59,9 +62,15 @@ async def _serve(daemon: Daemon, found: Startup, options: Options) -> None:
     reporting = asyncio.create_task(reporter.run(stop))
     operating = asyncio.create_task(access.run())
     besides = [operating, asyncio.create_task(reloader.run())]
-    if options.page is not None:
+    if network is not None:
         api = access.api, access.reload
-        page = serve(options.page, daemon, api, lambda: reporter.notes, access.troubles)
+        page = serve(
+            network,
+            daemon,
+            api,
+            lambda: reporter.notes,
+            lambda: [*access.troubles(), *_troubles(network)],
+        )
         besides.append(asyncio.create_task(page))
     await daemon.run(stop)
     for task in besides:
@@ -69,6 +78,10 @@ async def _serve(daemon: Daemon, found: Startup, options: Options) -> None:
     await asyncio.wait((operating,))
     await reporting
     SIGNALS.leave()
+
+
+def _troubles(network: AccessControl | None) -> list[str]:
+    return [] if network is None else network.troubles(time.time())
 
 
 def control_socket(named: Path | None) -> Path | None:

@@ -1,35 +1,34 @@
-"""What stands between the status listener and all that reach its port: bounds, headers, host check, token.
+"""What stands between the status listener and all that reach its port: names, tokens, roles, headers, turns.
 
-Reading is free; everything else needs the token. No answer ever carries a traceback.
+Nothing but the page's own files and two words of health is free beyond this machine. No answer ever carries a
+traceback, and no token is ever in the log.
 """
 
 from __future__ import annotations
 
 import asyncio
-import hmac
 import logging
-from collections import defaultdict
-from collections.abc import Awaitable, Callable
-from ipaddress import ip_address
-from typing import cast
+import time
+from collections.abc import Awaitable, Callable, Collection
+from dataclasses import dataclass
 
 from aiohttp import web
 from aiohttp.typedefs import Middleware
-from aiohttp.web_protocol import RequestHandler
 
-from gatewayd.control.server import asker
+from gatewayd.control.access import Caller
+from gatewayd.control.server import CALLER, IS_CURRENT, PEER, asker
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.loop.share import Busy, LoopShare
+from gatewayd.web.access_control import AccessControl
+from gatewayd.web.credentials import ASK, Judgement
+from gatewayd.web.doors import Doors
+from gatewayd.web.hosts import forwarded_peer, is_from_elsewhere, is_ours, normal_address
 
-MAX_CONNECTIONS = 32
-"""Open at a time; further ones are closed at once, so that a flood costs the robot's loop next to nothing."""
-FAIR = 8
-"""Connections of one peer that nobody takes from it. It may have more while there is room."""
-PATIENCE = 20.0
-"""Seconds after which a connection that has not finished a request is closed: idle, slow, or not reading its answer."""
 BUSY_DELAY = 1.0
 """Seconds before a client that asks too much is answered so."""
+MAX_DELAYED = 8
+"""Wrong tokens whose answers wait at one time; further ones are told to come later."""
 MAX_BODY = 4096
 """Bytes of a request's body."""
 HEADERS = {
@@ -46,122 +45,146 @@ HEADERS = {
 """Go with every answer."""
 MAX_PATH = 200
 """Characters of a path in the log."""
+FREE = frozenset({"/healthz", "/readyz"})
+"""Paths that anybody may ask, beside the page's files: short where the caller is not known."""
+STREAMS = frozenset({"/api/v1/events"})
+"""Paths of reading whose answer may have no end: a page of another site must not hold one open."""
 _READING = ("GET", "HEAD")
-_SWEEP = 2.0
+_LOGGED = 4
+"""Wrong tokens of a peer that are logged one by one; then each twice as many as the last."""
+_JUDGED = {
+    Judgement.NONE: "no_token",
+    Judgement.WRONG: "wrong_token",
+    Judgement.ENDED: "expired_token",
+}
 
 log = logging.getLogger("gatewayd.status")
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
-class Doors:
-    """Lets in at most `MAX_CONNECTIONS` connections to `server`, and shows out who wastes one or keeps others out."""
-
-    def __init__(self, server: web.Server) -> None:
-        self._server = server
-        self._seen: dict[RequestHandler, float] = {}
-        """Connections with the time of their last finished request, or of their beginning."""
-
-    def __call__(self) -> asyncio.Protocol:
-        """The protocol of a new connection, before it is known whose it is."""
-        return _Entrance(self)
-
-    def come_in(self, transport: asyncio.Transport) -> None:
-        """A peer has connected: it is served, or its connection is closed at once."""
-        self._forget_closed()
-        if len(self._seen) >= MAX_CONNECTIONS and not self._make_room(_peer(transport)):
-            transport.abort()
-            return
-        handler = self._server()
-        transport.set_protocol(handler)
-        handler.connection_made(transport)
-        self._seen[handler] = clock.now()
-
-    def finished(self, handler: RequestHandler) -> None:
-        """A request of the connection was answered."""
-        if handler in self._seen:
-            self._seen[handler] = clock.now()
-
-    async def sweep(self) -> None:
-        """Close what wastes a connection, until cancelled."""
-        while True:
-            await asyncio.sleep(_SWEEP)
-            self._forget_closed()
-            now = clock.now()
-            for handler in [handler for handler, seen in self._seen.items() if now - seen > PATIENCE]:
-                transport = handler.transport
-                if transport is not None:
-                    transport.abort()
-
-    def _make_room(self, peer: object) -> bool:
-        """The peer with the most connections, if they are more than `FAIR`, loses the one answered longest ago.
-
-        Only to one who has fewer than that, so that nobody drives out himself again and again.
-        """
-        of_peer: defaultdict[object, list[RequestHandler]] = defaultdict(list)
-        for handler in self._seen:
-            of_peer[_peer(handler.transport)].append(handler)
-        most = max(of_peer.values(), key=len)
-        if len(most) <= FAIR or len(of_peer[peer]) >= FAIR:
-            return False
-        longest = min(most, key=self._seen.__getitem__)
-        del self._seen[longest]
-        assert longest.transport is not None
-        longest.transport.abort()
-        return True
-
-    def _forget_closed(self) -> None:
-        for handler in [handler for handler in self._seen if handler.transport is None]:
-            del self._seen[handler]
+@dataclass(frozen=True, slots=True)
+class _Refusal:
+    status: int
+    text: str
+    delay: float = 0.0
+    """Seconds before it is answered."""
 
 
-class _Entrance(asyncio.Protocol):
-    """A connection until it is made."""
+class Guard:
+    """Judges every request to one listener. `page` are the paths of the page's files."""
 
-    def __init__(self, doors: Doors) -> None:
-        self._doors = doors
+    def __init__(self, access: AccessControl, page: Collection[str]) -> None:
+        self._access = access
+        self._free = FREE | frozenset(page)
+        self._names = frozenset(access.settings.own_names)
+        self._delayed = 0
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._doors.come_in(cast("asyncio.Transport", transport))
+    def judge(self, request: web.Request) -> _Refusal | None:
+        """Why the request is refused; None: it is not, and who asks is in it (`CALLER`), if that is known."""
+        peer = self._peer(request)
+        request[PEER] = peer
+        refusal = self._wrong_name(request) or self._foreign(request)
+        if refusal is not None:
+            return refusal
+        credentials, reading = self._access.credentials, request.method in _READING
+        header = request.headers.get("Authorization")
+        if credentials is None and not reading:
+            return _Refusal(403, "reading only: the gateway was started without --token-file")
+        if credentials is not None and (header is not None or not reading):
+            return self._unidentified(request, header, peer)
+        if request.path in self._free or self._access.settings.is_local:
+            return None
+        self._access.refused["no_token"] += 1
+        return _Refusal(401, ASK)
+
+    async def wait(self, refusal: _Refusal) -> None:
+        """Let a wrong token wait for its answer."""
+        if refusal.delay:
+            self._delayed += 1
+            try:
+                await asyncio.sleep(refusal.delay)
+            finally:
+                self._delayed -= 1
+
+    def _peer(self, request: web.Request) -> str:
+        """Who asks: the other end, or what the declared proxy says of it."""
+        peer, proxy = normal_address(request.remote or ""), self._access.settings.proxy
+        if proxy is None or peer != normal_address(proxy):
+            return peer
+        return forwarded_peer(request.headers.get("X-Forwarded-For")) or peer
+
+    def _wrong_name(self, request: web.Request) -> _Refusal | None:
+        hosts = request.headers.getall("Host", [])
+        if len(hosts) == 1 and is_ours(hosts[0], self._names, _own_addresses(request)):
+            return None
+        self._access.refused["host"] += 1
+        if len(hosts) != 1:
+            return _Refusal(400, "a request has exactly one Host header")
+        return _Refusal(
+            421,
+            "this name is not one of the gateway's: ask for its address, or declare the name (--status-name)",
+        )
+
+    def _foreign(self, request: web.Request) -> _Refusal | None:
+        if request.method in _READING and request.path not in STREAMS:
+            return None
+        headers = request.headers
+        if is_from_elsewhere(headers.get("Origin"), headers.get("Sec-Fetch-Site"), headers["Host"]):
+            self._access.refused["origin"] += 1
+            return _Refusal(403, "this was sent by a page of another site")
+        return None
+
+    def _unidentified(self, request: web.Request, header: str | None, peer: str) -> _Refusal | None:
+        """None: the caller is known, and noted in the request."""
+        credentials = self._access.credentials
+        assert credentials is not None
+        if len(request.headers.getall("Authorization", [])) > 1:
+            return _Refusal(400, "a request has at most one Authorization header")
+        found = credentials.identify(header, peer, time.time())
+        if isinstance(found, Caller):
+            request[CALLER] = found
+            request[IS_CURRENT] = lambda: credentials.is_current(found.holder, time.time())
+            return None
+        self._access.refused[_JUDGED[found.judgement]] += 1
+        if found.judgement is Judgement.WRONG:
+            delay = self._wrong_token(request, peer)
+            if self._delayed >= MAX_DELAYED:
+                return _Refusal(429, "too many wrong tokens at once: try again later")
+            return _Refusal(401, found.text, delay)
+        if found.judgement is Judgement.ENDED:
+            log.warning(
+                "a token that counts no more",
+                extra=fields(peer=peer, path=request.path[:MAX_PATH], reason=found.text),
+            )
+        return _Refusal(401, found.text)
+
+    def _wrong_token(self, request: web.Request, peer: str) -> float:
+        count, delay = self._access.wrong_tokens.wrong(peer, clock.now())
+        if count <= _LOGGED or count.bit_count() == 1:
+            log.warning(
+                "a request without the right token",
+                extra=fields(peer=peer, path=request.path[:MAX_PATH], times=count),
+            )
+        return delay
 
 
-def _peer(transport: asyncio.BaseTransport | None) -> object:
-    """The address of the other side."""
-    name = transport.get_extra_info("peername") if transport is not None else None
-    return name and name[0]
-
-
-def is_local_name(host: str) -> bool:
-    """Whether a Host header names an address or this machine, so that no other site's name was led here."""
-    name = host.rpartition(":")[0] if not host.endswith("]") and ":" in host else host
-    name = name.strip("[]").lower()
-    if name == "localhost" or name.endswith(".localhost"):
-        return True
-    try:
-        ip_address(name)
-    except ValueError:
-        return False
-    return True
-
-
-def middleware(
-    token: str | None, doors: Callable[[], Doors | None], share: LoopShare, *, local_only: bool
-) -> Middleware:
-    """Asks for the token, has who reads wait for his turn, answers errors in one line, adds `HEADERS`.
-
-    With `local_only` the Host header has to be local: a page from elsewhere in a browser on this machine could
-    otherwise read along under its own name (DNS rebinding).
-    """
+def middleware(guard: Guard, doors: Callable[[], Doors | None], share: LoopShare) -> Middleware:
+    """Has `guard` judge, has who reads wait for his turn, answers errors in one line, adds `HEADERS`."""
 
     @web.middleware
-    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
-        refusal = _refusal(request, token, local_only=local_only)
+    async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
+        refusal = guard.judge(request)
         try:
             if refusal is not None or request.method in _READING:
                 await share.request(asker(request))
+            if refusal is not None:
+                await guard.wait(refusal)
             if request.transport is None:
                 return _plain(503, "gone while waiting")  # nobody reads it, and nothing is done for it
-            response = _plain(*refusal) if refusal is not None else await _answer(request, handler)
+            response = (
+                await _answer(request, handler) if refusal is None else _plain(refusal.status, refusal.text)
+            )
         except Busy:
             await asyncio.sleep(BUSY_DELAY)  # who asks again at once would cost more than what was refused
             response = _plain(503, "too many requests at once: try again later, and less often")
@@ -172,24 +195,13 @@ def middleware(
             entrance.finished(request.protocol)
         return response
 
-    return guard
+    return guarded
 
 
-def _refusal(request: web.Request, token: str | None, *, local_only: bool) -> tuple[int, str] | None:
-    if local_only and not is_local_name(request.host):
-        return 421, "ask for 127.0.0.1 or localhost; a proxy must set the Host header to it"
-    if request.method in _READING:
-        return None
-    if token is None:
-        return 403, "reading only: the gateway was started without --token-file"
-    given = request.headers.get("Authorization", "").removeprefix("Bearer ")
-    if not hmac.compare_digest(given.encode("utf-8", "surrogateescape"), token.encode()):
-        log.warning(
-            "a request without the right token",
-            extra=fields(peer=request.remote, path=request.path[:MAX_PATH]),
-        )
-        return 401, "this needs the token: Authorization: Bearer TOKEN"
-    return None
+def _own_addresses(request: web.Request) -> tuple[str, ...]:
+    """The address at which this connection reached us."""
+    own = request.transport.get_extra_info("sockname") if request.transport is not None else None
+    return (normal_address(str(own[0])),) if own else ()
 
 
 async def _answer(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -208,5 +220,5 @@ async def _answer(request: web.Request, handler: Handler) -> web.StreamResponse:
 
 
 def _plain(status: int, text: str) -> web.Response:
-    headers = {"WWW-Authenticate": "Bearer"} if status == 401 else {}
+    headers = {401: {"WWW-Authenticate": "Bearer"}, 429: {"Retry-After": "10"}}.get(status, {})
     return web.Response(status=status, text=text + "\n", headers=headers)

@@ -7,17 +7,20 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from gatewayd.logs.records import fields
+from gatewayd.loop import clock
 from gatewayd.loop.retry import keep_running, reason_of, until_done
+from gatewayd.loop.threads import in_daemon_thread
 from gatewayd.report.format import address
 from gatewayd.service.daemon import Daemon
+from gatewayd.web.access_control import AccessControl
 from gatewayd.web.probes import Probes
-from gatewayd.web.settings import Settings
 
 if TYPE_CHECKING:
     from gatewayd.control.api import Api
@@ -25,13 +28,15 @@ if TYPE_CHECKING:
     from gatewayd.web.listener import StatusListener
 
 RETRY_PERIOD = 2.0
+FILES_PERIOD = 0.5
+"""Seconds between two looks at tokens and certificates: how long a revoked token may go on at most."""
 _LOOK = 0.05
 
 log = logging.getLogger("gatewayd.status")
 
 
 async def serve(
-    settings: Settings,
+    access: AccessControl,
     daemon: Daemon,
     api: tuple[Api, Reload | None] | None = None,
     notes: Callable[[], Iterable[str]] = lambda: (),
@@ -39,19 +44,40 @@ async def serve(
 ) -> None:
     """Measure and listen until cancelled. An address that cannot be had is said once and tried again."""
     probes = Probes(daemon, notes, remarks)
-    measuring = asyncio.create_task(probes.run())
+    beside = [asyncio.create_task(probes.run()), asyncio.create_task(_keep_up(access))]
     try:
         await _until_serving(daemon)
         await keep_running(
-            lambda: _listen(settings, probes, api),
+            lambda: _listen(access, probes, api),
             log,
             RETRY_PERIOD,
             what="internal error, starting the status listener again",
         )
     finally:
-        measuring.cancel()
-        with suppress(asyncio.CancelledError):
-            await measuring
+        for task in beside:
+            task.cancel()
+        for task in beside:
+            with suppress(asyncio.CancelledError):
+                await task
+
+
+async def _keep_up(access: AccessControl) -> None:
+    """Read tokens and certificates again when they change, and end what tokens hold that count no more."""
+    await keep_running(lambda: _follow_files(access), log, RETRY_PERIOD)
+
+
+async def _follow_files(access: AccessControl) -> None:
+    said: set[str] = set()
+    while True:
+        await in_daemon_thread(access.refresh, "status listener files")
+        troubles = set(access.troubles(time.time()))
+        for trouble in sorted(troubles - said):
+            log.warning("the status listener needs attention", extra=fields(reason=trouble))
+        said = troubles
+        if access.credentials is not None:
+            for ended in access.credentials.end_what_ended(clock.now(), time.time()):
+                log.warning("what a token held has ended", extra=fields(reason=ended))
+        await asyncio.sleep(FILES_PERIOD)
 
 
 async def _until_serving(daemon: Daemon) -> None:
@@ -59,13 +85,18 @@ async def _until_serving(daemon: Daemon) -> None:
         await asyncio.sleep(_LOOK)
 
 
-async def _listen(settings: Settings, probes: Probes, api: tuple[Api, Reload | None] | None) -> None:
+class _NotYet(OSError):
+    """What has to be done before the listener may be opened."""
+
+
+async def _listen(access: AccessControl, probes: Probes, api: tuple[Api, Reload | None] | None) -> None:
     module = await asyncio.to_thread(import_module, "gatewayd.web.listener")
+    settings = access.settings
 
     async def attempt() -> StatusListener:
-        listener: StatusListener = module.StatusListener(
-            settings.host, settings.port, probes, settings.token, api
-        )
+        if access.obstacle:
+            raise _NotYet(access.obstacle)
+        listener: StatusListener = module.StatusListener(access, probes, api)
         await listener.start()
         return listener
 
@@ -80,7 +111,8 @@ async def _listen(settings: Settings, probes: Probes, api: tuple[Api, Reload | N
         )
 
     listener = await until_done(attempt, OSError, report, RETRY_PERIOD)
-    log.info("status page", extra=fields(url=f"http://{address(settings.host, listener.port)}/"))
+    scheme = "http" if settings.tls is None else "https"
+    log.info("status page", extra=fields(url=f"{scheme}://{address(settings.host, listener.port)}/"))
     try:
         await asyncio.get_running_loop().create_future()
     finally:

@@ -15,16 +15,19 @@ from typing import TypeVar
 from aiohttp import web
 
 from gatewayd import __version__
+from gatewayd.control.access import Caller
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Reload
-from gatewayd.control.server import application, asker
+from gatewayd.control.server import CALLER, application, asker
 from gatewayd.loop import clock
 from gatewayd.loop.share import LoopShare, in_one_step
 from gatewayd.loop.threads import in_daemon_thread
 from gatewayd.mapping.plan import Plan
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.web import view
-from gatewayd.web.guard import MAX_BODY, MAX_CONNECTIONS, Doors, is_local_name, middleware
+from gatewayd.web.access_control import AccessControl
+from gatewayd.web.doors import MAX_CONNECTIONS, Doors
+from gatewayd.web.guard import MAX_BODY, Guard, middleware
 from gatewayd.web.health import health
 from gatewayd.web.metrics import CONTENT_TYPE, Exposition
 from gatewayd.web.probes import Probes
@@ -38,6 +41,7 @@ PAGE = {
     "/picture.js": ("picture.js", "text/javascript"),
     "/variables.js": ("variables.js", "text/javascript"),
     "/operate.js": ("operate.js", "text/javascript"),
+    "/session.js": ("session.js", "text/javascript"),
     "/facts.js": ("facts.js", "text/javascript"),
     "/groups.js": ("groups.js", "text/javascript"),
     "/history.js": ("history.js", "text/javascript"),
@@ -53,30 +57,27 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class StatusListener:
-    """Answers on `host` and `port` (0: any free one) about the daemon that `probes` measures.
+    """Answers where `access` says (port 0: any free one), and whom it knows, about the daemon that `probes` measures.
 
-    `token` is asked for by everything but reading; None: nothing but reading. With `api` the control interface is under
-    /api as well.
+    With `api` the control interface is under /api as well.
     """
 
     def __init__(
         self,
-        host: str,
-        port: int,
+        access: AccessControl,
         probes: Probes,
-        token: str | None = None,
         api: tuple[Api, Reload | None] | None = None,
     ) -> None:
-        self._host, self._port = host, port
+        self._access = access
+        self._host, self._port = access.settings.host, access.settings.port
         self._probes = probes
         self._exposition = Exposition(probes, __version__)
-        self._acts = token is not None and api is not None
-        """Whether a client with the token can change anything."""
+        self._has_api = api is not None
         self._doors: Doors | None = None
         self._share = api[0].share if api is not None else LoopShare()
         self._layouts: dict[str, tuple[Plan, bytes]] = {}
-        guard = middleware(token, lambda: self._doors, self._share, local_only=_is_loopback(host))
-        self._app = web.Application(middlewares=[guard], client_max_size=MAX_BODY)
+        guarded = middleware(Guard(access, PAGE), lambda: self._doors, self._share)
+        self._app = web.Application(middlewares=[guarded], client_max_size=MAX_BODY)
         self._app.add_routes(self._routes())
         if api is not None:
             self._app.add_subapp("/api", application(*api))
@@ -96,7 +97,7 @@ class StatusListener:
         )
         await runner.setup()
         assert runner.server is not None
-        doors = Doors(runner.server)
+        doors = Doors(runner.server, self._access, self._share)
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(doors, self._host, self._port, backlog=MAX_CONNECTIONS)
         self._doors, self._runner = doors, runner
@@ -106,6 +107,8 @@ class StatusListener:
         """Stop listening and end all connections."""
         if self._server is not None:
             self._server.close()
+        if self._doors is not None:
+            self._doors.close()
         if self._sweeper is not None:
             self._sweeper.cancel()
         if self._runner is not None:
@@ -121,19 +124,32 @@ class StatusListener:
             web.get("/healthz", self._healthz),
             web.get("/readyz", self._readyz),
             web.get("/metrics", self._metrics),
+            web.get("/page/session", self._session),
             web.get("/page/cells", self._overview),
             web.get("/page/cells/{cell}", self._layout),
             web.get("/page/cells/{cell}/state", self._state),
             web.get("/page/cells/{cell}/history", self._history),
         ]
 
-    async def _healthz(self, _request: web.Request) -> web.Response:
+    def _is_known(self, request: web.Request) -> bool:
+        """Whether the one who asks may read; the paths that are free tell others no more than they have to."""
+        return self._access.settings.is_local or CALLER in request
+
+    async def _healthz(self, request: web.Request) -> web.Response:
         healthy, answer = health(self._probes.late)
-        return _json(answer, status=200 if healthy else 503)
+        shown = answer if self._is_known(request) else {"healthy": healthy}
+        return _json(shown, status=200 if healthy else 503)
 
     async def _readyz(self, request: web.Request) -> web.Response:
         ready, answer = await self._done(request, lambda: self._probes.readiness(clock.now()))
-        return _json(answer, status=200 if ready else 503)
+        shown = answer if self._is_known(request) else {"ready": ready}
+        return _json(shown, status=200 if ready else 503)
+
+    async def _session(self, request: web.Request) -> web.Response:
+        """Who asks, for the page: what to offer, and whose name to show. Never shared with another one's answer."""
+        caller = request.get(CALLER)
+        signs_in = self._access.credentials is not None and self._has_api
+        return _json({"tokens": signs_in, "caller": None if caller is None else _caller(caller)})
 
     async def _metrics(self, request: web.Request) -> web.Response:
         body = await self._share.done_once("/metrics", asker(request), self._exposition.text)
@@ -144,8 +160,7 @@ class StatusListener:
         return web.Response(body=body, content_type="application/json")
 
     def _overview_now(self) -> bytes:
-        acts = {"acts": self._acts}
-        return view.as_json(view.overview(self._probes, __version__, clock.now()) | acts)
+        return view.as_json(view.overview(self._probes, __version__, clock.now()))
 
     async def _layout(self, request: web.Request) -> web.Response:
         body = await self._done(request, lambda: self._layout_of(self._runtime(request)))
@@ -189,6 +204,15 @@ class StatusListener:
         raise web.HTTPNotFound(reason="there is no such cell")
 
 
+def _caller(caller: Caller) -> dict[str, object]:
+    return {
+        "name": caller.holder.name,
+        "role": caller.role.title,
+        "level": int(caller.role),
+        "expires": caller.expires,
+    }
+
+
 def _json(document: object, status: int = 200) -> web.Response:
     return web.Response(body=view.as_json(document), status=status, content_type="application/json")
 
@@ -209,7 +233,3 @@ def _file(name: str, content_type: str) -> Handler:
         return await _packed(request, body, headers)
 
     return handle
-
-
-def _is_loopback(host: str) -> bool:
-    return is_local_name(host) and (host == "localhost" or host.startswith(("127.", "::1", "[::1")))

@@ -12,7 +12,7 @@ from collections.abc import Generator
 from itertools import groupby, islice
 from typing import Any
 
-from gatewayd.control.views import Declared, declare, truth
+from gatewayd.control.views import Declared, declare, holders, truth
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Lock
 from gatewayd.core.events import CAPACITY, Event, EventKind
@@ -138,7 +138,7 @@ def state(runtime: CellRuntime, probes: Probes, since: int, now: float) -> dict[
     image, ownership, health = cell.image, cell.ownership, cell.health
     nodes = _picture(runtime, probes, now)
     owned = [
-        [lock, owner, _milliseconds(ownership.remaining(lock, now))]
+        [lock, owner, _milliseconds(ownership.remaining(lock, now)), holders(cell, lock)]
         for lock, owner in enumerate(ownership.owners)
         if owner is not None
     ]
@@ -170,10 +170,12 @@ def past(runtime: CellRuntime, probes: Probes, now: float) -> Generator[None, No
 
 
 def _forced(runtime: CellRuntime, index: int, now: float) -> list[object]:
-    """Variable, milliseconds left, and the truth beside it with its quality."""
+    """Variable, milliseconds left, the truth beside it with its quality, and who forces it."""
     value, quality = truth(runtime, index) or (None, None)
-    left = _milliseconds(runtime.cell.forcing.forces[index].until - now)
-    return [index, left, None if value is None else _number(value), None if quality is None else int(quality)]
+    force = runtime.cell.forcing.forces[index]
+    shown = None if value is None else _number(value)
+    left = _milliseconds(force.until - now)
+    return [index, left, shown, None if quality is None else int(quality), force.holder.title]
 
 
 def _number(value: float) -> float:

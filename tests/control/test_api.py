@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from gatewayd.audit.trail import Audit
+from gatewayd.control.access import local_caller
 from gatewayd.control.api import NEWS, Api, ApiError, Cursor
 from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
@@ -18,7 +19,7 @@ from tests.control.served import LIMIT, PATH, SPEED, FixedGateway, Served, at, b
 from tests.works import finished
 
 PLC = 0
-BY = "by anna"
+BY = local_caller("anna")
 
 
 def refused(status: int, code: str, act: Any, *args: Any) -> str:
@@ -94,6 +95,7 @@ class TestQuestions:
             "declared_lease": 2.0,
             "owner": "plc",
             "remaining": 1.5,
+            "by": None,
         }
         assert locks["start"]["owner"] is None
 
@@ -170,9 +172,9 @@ class TestLocks:
     def test_take_names_who_did_it(self, api: Api, press: Served) -> None:
         assert press.cell.write(Requester(PLC), [Change(SPEED, 1.0)], 1.0) is None
         lock = api.take("motion", {"for": 10}, BY, at(1.0))
-        assert (lock["owner"], lock["remaining"]) == ("operator", 10.0)
+        assert (lock["owner"], lock["remaining"], lock["by"]) == ("operator", 10.0, "anna")
         taken = [event for event in press.cell.events if event.kind is EventKind.TAKEN_OVER]
-        assert [event.detail for event in taken] == [BY]
+        assert [event.detail for event in taken] == [BY.detail]
         assert press.cell.image.values[SPEED] == 0.5, "it is the command of the PLC no more"
 
     def test_a_variable_names_its_lock(self, api: Api, press: Served) -> None:

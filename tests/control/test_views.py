@@ -118,7 +118,7 @@ def test_a_force_is_told_with_what_is_left_of_it(api: Api, press: Served) -> Non
     assert press.cell.operator.force(CYCLES, 7, 1.0, 11.0) is None
     (found,) = finished(api.variables({"name": "cycles"}, at(4.0)))["variables"]
     assert (found["value"], found["quality"], found["age"]) == (7, "forced", 3.0)
-    truth = {"reported": 1, "reported_quality": "good"}
+    truth = {"reported": 1, "reported_quality": "good", "by": None}
     assert found["forced"] == {"value": 7, "remaining": 7.0} | truth
 
 

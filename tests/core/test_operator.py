@@ -13,15 +13,18 @@ from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR, CellDefinition, Value
 from gatewayd.core.events import EventKind
+from gatewayd.core.forcing import Holder
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
+from gatewayd.core.succession import succeed
 
 PLC, HMI, AUX = range(3)
 START, LAMP, PART, FORCE, SPEED, PATH, CYCLES, LEVEL, MODE, ALARM = range(10)
 MOTION = 4
 SECOND = 60.0
+ANNA = Holder("anna", "her token")
 
 
 def kinds(cell: Cell) -> list[EventKind]:
@@ -112,6 +115,56 @@ class TestLocks:
         cell.stop(2.0, "the gateway stops")
         assert cell.ownership.owners == [None] * 5
         assert (cell.image.values[LAMP], cell.image.values[CYCLES]) == (False, 5)
+
+    def test_who_takes_it_next_is_an_event_of_its_own(self, cell: Cell) -> None:
+        """Nothing changes hands on the bus, but who answers for it does."""
+        cell.operator.take_lock(PART, 1.0, detail="by token anna", holder=ANNA)
+        cell.operator.take_lock(PART, 1.1, 5.0, detail="by token anna", holder=ANNA)
+        taken = [event.detail for event in cell.events if event.writer == OPERATOR]
+        assert taken == ["by token anna"]
+        cell.operator.take_lock(PART, 1.2, detail="by bert", holder=Holder("bert"))
+        last = list(cell.events)[-1]
+        assert (last.kind, last.writer, last.other) == (EventKind.TAKEN_OVER, OPERATOR, OPERATOR)
+        assert last.detail == "by bert, held by token anna before"
+        assert cell.forcing.holders(PART, ()) == [Holder("bert")]
+
+
+class TestHolders:
+    """What one holds ends with what he acts by, and what another one needs does not."""
+
+    def test_a_lock_that_another_one_forces_in_stays_the_operators(self, cell: Cell) -> None:
+        cell.operator.take_lock(MOTION, 1.0, holder=ANNA)
+        assert cell.operator.force(SPEED, 0.4, 1.0, 50.0) is None
+        assert cell.operator.end_of(lambda holder: holder == ANNA, 2.0, "revoked")
+        assert (cell.ownership.owners[MOTION], cell.ownership.expires[MOTION]) == (OPERATOR, 50.0)
+        assert list(cell.forcing.forces) == [SPEED]
+
+    def test_forces_end_and_the_lock_that_another_one_took_stays(self, cell: Cell) -> None:
+        cell.operator.take_lock(MOTION, 1.0)
+        assert cell.operator.force(SPEED, 0.4, 1.0, 50.0, holder=ANNA) is None
+        assert cell.operator.force(CYCLES, 9, 1.0, 50.0, holder=ANNA) is None
+        assert cell.operator.end_of(lambda holder: holder == ANNA, 2.0, "revoked")
+        assert (cell.ownership.owners[MOTION], cell.ownership.expires[MOTION]) == (OPERATOR, math.inf)
+        assert cell.forcing.forces == {}
+        assert [event.detail for event in cell.events if event.kind is EventKind.UNFORCED] == ["revoked"] * 2
+
+    def test_fallbacks_apply_as_with_a_release(self, cell: Cell) -> None:
+        assert cell.operator.force(SPEED, 0.4, 1.0, 50.0, holder=ANNA) is None
+        assert cell.operator.end_of(lambda holder: holder == ANNA, 2.0, "revoked")
+        assert cell.image.values[SPEED] == 0.0
+        assert cell.ownership.owners[MOTION] is None
+
+    def test_nothing_of_his_is_nothing_to_do(self, cell: Cell) -> None:
+        cell.operator.take_lock(MOTION, 1.0)
+        before = len(cell.events)
+        assert not cell.operator.end_of(lambda holder: holder == ANNA, 2.0, "revoked")
+        assert len(cell.events) == before
+
+    def test_they_outlive_a_reload(self, cell: Cell, press: CellDefinition) -> None:
+        cell.operator.take_lock(MOTION, 1.0, holder=ANNA)
+        successor = succeed(cell, press, 1.5).cell
+        assert successor.operator.end_of(lambda holder: holder == ANNA, 2.0, "revoked")
+        assert successor.ownership.owners[MOTION] is None
 
 
 class TestForcedInput:

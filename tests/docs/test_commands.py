@@ -40,7 +40,7 @@ ELSEWHERE = {
     r"mbpoll -0 .*": "tests/docs/test_tutorial.py, test_device_tutorials.py, with another Modbus client",
     r"make (bench|demo)\b.*": "the Makefile; tests/test_docs.py knows its targets",
     r"make soak\b.*": "tests/soak/test_soak.py; tests/test_docs.py knows the target",
-    r"\(umask 077; head -c 24 /dev/urandom \| base64 > token\)": "tests/web/test_launch.py reads such files",
+    r"(sudo )?gatewayd token .*": "tests/cli/test_token.py",
     r"curl -X POST .* http://127\.0\.0\.1:9502/api/v1/locks/start/take": "tests/web/test_listener.py",
     r"promtool check .*": "tests/web/test_promtool.py",
     r"sudo systemctl reload prometheus": "Prometheus' own",

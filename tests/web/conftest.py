@@ -16,9 +16,11 @@ from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
+from gatewayd.web.access_control import AccessControl
 from gatewayd.web.listener import StatusListener
 from gatewayd.web.probes import Probes
-from tests.web.press import FORCE_LIMIT, HMI, MAPPING, PLC, SPARE, START, TOKEN
+from gatewayd.web.settings import settings
+from tests.web.press import FORCE_LIMIT, HMI, MAPPING, PLC, SPARE, START, engineer
 
 
 @pytest.fixture
@@ -60,8 +62,15 @@ def probes(runtime: CellRuntime, daemon: Daemon) -> Probes:
 
 
 @pytest.fixture
-async def listener(probes: Probes, daemon: Daemon) -> AsyncIterator[StatusListener]:
-    found = StatusListener("127.0.0.1", 0, probes, TOKEN, (Api(daemon, Audit()), None))
+def access(daemon: Daemon, token_file: Path) -> AccessControl:
+    found = AccessControl(settings("127.0.0.1:0", token_file), lambda: daemon.cells)
+    found.refresh()
+    return found
+
+
+@pytest.fixture
+async def listener(access: AccessControl, probes: Probes, daemon: Daemon) -> AsyncIterator[StatusListener]:
+    found = StatusListener(access, probes, (Api(daemon, Audit()), None))
     await found.start()
     yield found
     await found.close()
@@ -69,7 +78,4 @@ async def listener(probes: Probes, daemon: Daemon) -> AsyncIterator[StatusListen
 
 @pytest.fixture
 def token_file(tmp_path: Path) -> Path:
-    path = tmp_path / "token"
-    path.write_text(TOKEN + "\n")
-    path.chmod(0o600)
-    return path
+    return engineer(tmp_path / "tokens")

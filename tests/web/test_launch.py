@@ -12,8 +12,9 @@ import aiohttp
 import pytest
 
 from gatewayd.service.daemon import Daemon
+from gatewayd.web.access_control import AccessControl
 from gatewayd.web.launch import serve
-from gatewayd.web.settings import Settings
+from gatewayd.web.settings import settings
 from tests.e2e.plant import Plant
 from tests.e2e.processes import HOST, free_port
 from tests.web.press import TOKEN
@@ -27,7 +28,7 @@ async def test_an_address_in_use_is_said_once_and_tried_again(
     port = free_port()
     caplog.set_level("INFO")
     squatter = await asyncio.start_server(lambda _r, _w: None, HOST, port)
-    serving = asyncio.create_task(serve(Settings(f"{HOST}:{port}"), daemon))
+    serving = asyncio.create_task(serve(AccessControl(settings(f"{HOST}:{port}")), daemon))
     try:
         await _said(caplog, "cannot listen")
         await asyncio.sleep(0.1)
@@ -66,7 +67,7 @@ async def test_the_daemon_answers_and_obeys_the_token(tmp_path: Path, token_file
             headers = {"Authorization": f"Bearer {TOKEN}"}
             async with session.post("/api/v1/reload", headers=headers) as response:
                 assert response.status == 200, await response.text()
-        daemon.wait_for_line("reload asked for", "from 127.")
+        daemon.wait_for_line("reload asked for", "by token anna from 127.0.0.1")
         code, seconds = daemon.stop()
         assert code == 0
         assert seconds < 3

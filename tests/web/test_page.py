@@ -10,12 +10,15 @@ from dataclasses import dataclass
 from urllib.parse import quote
 from urllib.request import Request, urlopen
 
+import aiohttp
 import pytest
 
+from gatewayd.control.access import Role
 from tests.e2e.plant import Plant
 from tests.e2e.plc import HMI, PLC, Plc
 from tests.e2e.processes import HOST, Daemon, Simulator, free_port
 from tests.web.browser import CHROMIUM, Page, browsing
+from tests.web.press import TOKEN, engineer, token, write_tokens
 
 pytestmark = pytest.mark.skipif(
     CHROMIUM is None, reason="Chromium is not installed (Debian package chromium)"
@@ -59,7 +62,8 @@ variables:
           canopen: auto, unit: N}
   q: {robot: actual_q, modbus: {holding: 200, type: float32}, unit: rad}
 """
-TOKEN = "test-token-0123456789"  # noqa: S105 - for tests
+END = "new Date(new Date(document.getElementById('who').title.slice(16))).toLocaleTimeString()"
+"""When the token ends, as the page says it to those who point at the name."""
 LIVE = "document.body.dataset.contact === 'live'"
 LOST = "document.body.dataset.contact === 'lost'"
 NARROW, WIDE = (360, 740), (1280, 800)
@@ -83,9 +87,7 @@ async def showing(
 ) -> AsyncIterator[Shown]:
     simulator = plant.simulator()
     port = free_port()
-    token = plant.directory / "token"
-    token.write_text(f"{TOKEN}\n")
-    token.chmod(0o600)
+    token = engineer(plant.directory / "tokens")
     file = plant.mapping(mapping, simulator.port)
     daemon = plant.daemon(file, "--status", f"{HOST}:{port}", "--token-file", token)
     plc = plant.ready_plc(PLC)
@@ -295,28 +297,27 @@ async def test_without_the_gateway_the_page_greys_and_says_since_when(plant: Pla
             await page.wait("document.getElementById('alarm').hidden")
 
 
-async def test_force_and_release_need_the_token_and_a_second_click(plant: Plant) -> None:
+async def test_force_and_release_need_a_second_click(plant: Plant) -> None:
     async with showing(plant, NARROW) as shown:
         page, plc = shown.page, shown.plc
         assert plc.write(10, [17]) == 0
         await page.wait(f"{row('part', 'span.owner')} === 'plc'")
+        await sign_in(page, TOKEN)
+        await page.wait(f"{text('#who')} === 'anna, engineer, until ' + {END}")
         await open_act(page, "part", "Force …")
         await page.wait("document.activeElement.id === 'act-value'")
         assert await page.run(NAMELESS) == []
         assert await page.run(DIALOG_CONTRASTS) == []
-        await fill(page, value="4,5", token=TOKEN)
+        await fill(page, value="4,5")
         await page.run("document.getElementById('act-go').click()")
         await page.wait(f"{text('#act-error')} === 'The value has to be a number, with a point: 1.5.'")
-        await fill(page, value="55", token=f"not {TOKEN}")
-        await confirm(page, "Force part from 17 to 55 for 60 s. The robot gets it at once.")
-        await page.wait(f"{text('#act-error')}.startsWith('The token is not')")
-        await fill(page, value="1000", token=TOKEN)
+        await fill(page, value="1000")
         await confirm(page, "Force part from 17 to 1000")
         await page.wait(f"{text('#act-error')}.includes('out of limits')")
         assert plc.read(10) == [17], "nothing was forced so far"
-        await fill(page, value="55", token=TOKEN)
+        await fill(page, value="55")
         await page.run("document.getElementById('act-go').click()")
-        await fill(page, value="56", token=TOKEN)
+        await fill(page, value="56")
         await page.wait(f"{text('#act-go')} === 'Next'")
         await confirm(page, "Force part from 17 to 56 for 60 s.")
         await page.wait("!document.getElementById('act').open")
@@ -332,41 +333,106 @@ async def test_force_and_release_need_the_token_and_a_second_click(plant: Plant)
         assert plc.write(10, [19]) == 0
         await page.wait(f"{row('part', 'span.owner')} === 'plc'")
         await open_act(page, "part", "Take lock …")
-        await fill(page, seconds="soon", token=TOKEN)
+        await fill(page, seconds="soon")
         await page.run("document.getElementById('act-go').click()")
         await page.wait(f"{text('#act-error')} === 'The time has to be a number of seconds.'")
-        await fill(page, seconds="", token=TOKEN[::-1])
-        await confirm(
-            page, "Take the lock part from plc until it is released. Whoever else writes what it guards"
-        )
-        await page.wait(f"{text('#act-error')}.startsWith('The token is not')")
-        assert plc.write(10, [20]) == 0, "nothing was taken so far"
-        await fill(page, seconds="90", token=TOKEN)
+        await fill(page, seconds="90")
         await confirm(page, "Take the lock part from plc for 90 s.")
-        await page.wait(f"{row('part', 'span.owner')}.startsWith('local operator, ')")
+        await page.wait(f"{row('part', 'span.owner')}.startsWith('operator (token anna), ')")
         assert plc.write(10, [21]) == 6
-        await page.wait(f"{text('#owned')}.includes('local operator')")
+        await page.wait(f"{text('#owned')}.includes('operator (token anna)')")
         await open_act(page, "part", "Take lock …")
-        await fill(page, seconds="", token=TOKEN)
+        await fill(page, seconds="")
         await confirm(page, "Keep the lock part until it is released.")
-        await page.wait(f"{row('part', 'span.owner')} === 'local operator'")
+        await page.wait(f"{row('part', 'span.owner')} === 'operator (token anna)'")
         await open_act(page, "part", "Release lock …")
-        await confirm(page, "Release the lock part, which the local operator owns.")
+        await confirm(page, "Release the lock part, which the operator (token anna) owns.")
         await page.wait(f"{row('part', 'span.owner')} === 'free'")
         shown.daemon.kill()
         await page.wait(LOST)
         await open_act(page, "part", "Force …")
-        await fill(page, value="1", token=TOKEN)
+        await fill(page, value="1")
         await confirm(page, "Force part")
         await page.wait(f"{text('#act-error')} === 'The gateway does not answer: nothing was sent.'")
 
 
-async def open_act(page: Page, name: str, act: str) -> None:
-    """Open the variable's details, if they are not, and the dialog of an act."""
+async def test_who_may_do_what(plant: Plant) -> None:
+    """What the role lacks is disabled with the reason; a revoked token is signed out, and what it held has ended."""
+    async with showing(plant, NARROW) as shown:
+        page, tokens = shown.page, plant.directory / "tokens"
+        await page.wait("document.getElementById('sign-in').checkVisibility()")
+        await open_details(page, "part")
+        await page.wait(f"{text('.detail .lack')} === 'Sign in to do this.'")
+        assert (
+            await page.run(
+                "[...document.querySelectorAll('.detail .acts button')].filter((one) => !one.disabled).length"
+            )
+            == 0
+        )
+        await page.run("document.getElementById('sign-in').click()")
+        assert await page.run(NAMELESS) == []
+        await enter(page, "not the token")
+        await page.wait(f"{text('#token-error')}.startsWith('Not signed in: the token is not one of')")
+        assert await page.run(DIALOG_CONTRASTS) == []
+        assert await page.run("sessionStorage.length + document.cookie.length") == 0
+        operator = token("bert", Role.OPERATOR, "token of bert", 3 * 86400)
+        write_tokens(tokens, operator)
+        await counts(shown, "token of bert")
+        await enter(page, "token of bert")
+        await page.wait(f"{text('#who')} === 'bert, operator'")
+        lack = "This needs the role engineer; bert is operator."
+        await page.wait(f"{text('.detail .lack')} === '{lack}'")
+        await open_act(page, "part", "Take lock …")
+        await fill(page, seconds="")
+        await confirm(page, "Take the lock part")
+        await page.wait(f"{row('part', 'span.owner')} === 'operator (token bert)'")
+        assert await page.run(CONTRASTS) == []
+        assert await page.run("[location.href, document.cookie].join('').includes('token')") is False
+        write_tokens(tokens)
+        await page.wait(f"{text('#token-error')}.startsWith('Signed out: the token is not one of')")
+        write_tokens(tokens, operator)
+        await counts(shown, "token of bert")
+        await enter(page, "token of bert")
+        await page.wait(f"{row('part', 'span.owner')} === 'free'")
+        await page.wait(f"{text('#happened')}.includes('the token bert was revoked')")
+        await page.run("document.getElementById('sign-out').click()")
+        await page.wait("document.getElementById('sign-in').checkVisibility()")
+        assert await page.run("sessionStorage.length") == 0
+
+
+async def counts(shown: Shown, given: str) -> None:
+    """Return when the gateway has read the file in which this token is."""
+    async with aiohttp.ClientSession(headers={"Authorization": f"Bearer {given}"}) as session:
+        while True:
+            async with session.get(f"{shown.url}page/session") as answer:
+                if answer.status == 200:
+                    return
+
+
+async def sign_in(page: Page, given: str) -> None:
+    await page.wait("document.getElementById('sign-in').checkVisibility()")
+    await page.run("document.getElementById('sign-in').click()")
+    await enter(page, given)
+    await page.wait("!document.getElementById('session').open")
+
+
+async def enter(page: Page, given: str) -> None:
+    await page.wait("document.getElementById('session').open")
+    await page.run(f"document.getElementById('token').value = {json.dumps(given)}")
+    await page.run("document.getElementById('token-go').click()")
+
+
+async def open_details(page: Page, name: str) -> None:
+    await page.wait("document.querySelector('#rows tr')")
     await page.run(
         f"(([button]) => button.ariaExpanded === 'true' || button.click())"
         f"([...document.querySelectorAll('button.name')].filter((one) => one.textContent === '{name}'))"
     )
+
+
+async def open_act(page: Page, name: str, act: str) -> None:
+    """Open the variable's details, if they are not, and the dialog of an act."""
+    await open_details(page, name)
     button = (
         f"[...document.querySelectorAll('.detail .acts button')].find((one) => one.textContent === '{act}')"
     )

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from gatewayd.core.events import Event, EventKind
+from gatewayd.core.forcing import Holder
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.mapping.loader import load
 from gatewayd.service.cell_runtime import CellRuntime
@@ -87,19 +88,20 @@ def test_state_has_a_column_entry_for_every_variable(runtime: CellRuntime, probe
 
 def test_owned_locks_tell_owner_and_what_is_left(runtime: CellRuntime, probes: Probes) -> None:
     start, force_limit = told(runtime, probes)["owned"]
-    assert start == [0, PLC, None]
+    assert start == [0, PLC, None, ""]
     assert force_limit[:2] == [1, PLC]
     assert 0 < force_limit[2] <= 5000
 
 
 def test_a_forced_output_tells_the_age_of_its_force(runtime: CellRuntime, probes: Probes) -> None:
     now = time.monotonic()
-    runtime.cell.operator.force(CYCLES, 77, now - 1, now + 60)
+    runtime.cell.operator.force(CYCLES, 77, now - 1, now + 60, holder=Holder("anna", "a key"))
     found = told(runtime, probes)
     assert (found["values"][CYCLES], found["quality"][CYCLES]) == (77, 4)
     assert found["ages"][CYCLES] >= 1000
-    [[index, left, reported, quality]] = found["forced"]
+    [[index, left, reported, quality, holder]] = found["forced"]
     assert (index, reported, quality) == (CYCLES, 0, 0), "the truth beside it"
+    assert holder == "token anna"
     assert 0 < left <= 60_000
 
 

@@ -3,35 +3,40 @@
 import { Cells, worstOf } from "./cells.js";
 import { Operate } from "./operate.js";
 import { LEVELS, MARKS, Picture } from "./picture.js";
+import { Session, SignInNeeded } from "./session.js";
 import { Variables } from "./variables.js";
-import { OPERATOR, OPERATOR_NAME, clock, count, make, printable, put, putName, span } from "./words.js";
+import { byId, clock, count, make, ownerName, printable, put, putName, span } from "./words.js";
 
 const PERIOD = 250;
 const PATIENCE = 1500;                // without an answer for so long, nothing on the page is believed
 const GLANCE = 4;                     // looks at this cell for each look at all of them
+const SESSION = 40;                   // looks at this cell for each question whether the role is still the same
 const EVENTS = 200;
-const byId = (id) => document.getElementById(id);
 
 const picture = new Picture(byId("picture"));
 const cells = new Cells(byId("cells"));
-const operate = new Operate();
+const session = new Session();
+const operate = new Operate(session);
 const variables = new Variables(1000 / PERIOD, operate);
 let layout = null, cell = null, events = 0, looks = 0, missed = true;
 let answered = -Infinity, answeredAt = null, trouble = "";
 
 async function ask(path) {
-  const response = await fetch(path, { signal: AbortSignal.timeout(PATIENCE), cache: "no-store" });
+  const response = await fetch(path, {
+    headers: session.headers, signal: AbortSignal.timeout(PATIENCE), cache: "no-store",
+  });
+  if (response.status === 401) session.refused((await response.text()).trim());
   if (!response.ok) throw new Error(`${response.status} ${(await response.text()).trim().slice(0, 100)}`);
   return response.json();
 }
 
 async function choose() {
-  const { cells: found, gatewayd, acts } = await ask("page/cells");
+  await session.ask();
+  const { cells: found, gatewayd } = await ask("page/cells");
   const names = found.map((one) => one.name);
   const wanted = decodeURIComponent(location.hash.slice(1));
   cell = names.includes(wanted) ? wanted : names[0];
   if (cell === undefined) throw new Error("the gateway serves no cell");
-  operate.allowed = acts;
   operate.close();
   cells.show(found, cell);
   putName(byId("cell"), cell);
@@ -54,6 +59,7 @@ async function look() {
     missed = false;
   }
   looks += 1;
+  if (looks % SESSION === 0) await session.ask();
   if (looks % GLANCE === 0) cells.show((await ask("page/cells")).cells, cell);
   if (asked !== layout) return;
   const state = await ask(`page/cells/${encodeURIComponent(cell)}/state?since=${events}`);
@@ -100,11 +106,11 @@ function showLocks(state) {
     item.append(make("strong"), make("span", "by"), make("span", "left muted"));
     owned.append(item);
   }
-  state.owned.forEach(([lock, owner, left], index) => {
+  state.owned.forEach(([lock, owner, left, holders], index) => {
     const [name, by, rest] = owned.children[index].children;
     const { name: title, variables: members } = layout.locks[lock];
     putName(name, members.length > 1 ? `${title} (${count(members.length, "variable")})` : title);
-    put(by, owner === OPERATOR ? OPERATOR_NAME : layout.writers[owner].name);
+    put(by, ownerName(owner, holders, layout.writers));
     put(rest, left === null ? "until released" : `${span(left)} left`);
   });
 }
@@ -125,29 +131,31 @@ function showEvents({ count: told, latest }) {
 
 // Whether what is shown may be believed, said where nobody can overlook it.
 function judge() {
-  const age = performance.now() - answered;
-  const contact = age <= PATIENCE ? "live" : answeredAt ? "lost" : trouble ? "lost" : "waiting";
+  const age = performance.now() - answered, out = session.isAsking;
+  const contact = age <= PATIENCE ? "live" : answeredAt ? "lost" : trouble && !out ? "lost" : "waiting";
   const alarm = byId("alarm");
   document.body.dataset.contact = contact;
-  put(byId("contact-words"), { live: "live", lost: "no answer", waiting: "connecting" }[contact]);
+  put(byId("contact-words"), out ? "not signed in" : { live: "live", lost: "no answer", waiting: "connecting" }[contact]);
   alarm.hidden = contact !== "lost";
   if (contact !== "lost") return;
   byId("worst").hidden = true;
   const since = answeredAt ? `since ${clock(answeredAt)} (${span(age)})` : "so far";
-  document.title = `? ${cell ?? ""} - no answer`;
-  put(alarm, `No answer from the gateway ${since}. ${answeredAt ? "Everything below is old." : ""}`);
+  document.title = `? ${cell ?? ""} - ${out ? "not signed in" : "no answer"}`;
+  const words = out ? `Not signed in ${since}.` : `No answer from the gateway ${since}.`;
+  put(alarm, `${words} ${answeredAt ? "Everything below is old." : ""}`);
   alarm.title = printable(trouble);
 }
 
 async function run() {
   for (;;) {
     const begun = performance.now();
-    if (!document.hidden) {
+    if (!document.hidden && !session.isAsking) {
       try {
         await look();
       } catch (error) {
         trouble = String(error.message ?? error);
-        if (trouble.startsWith("404")) layout = null;
+        if (error instanceof SignInNeeded) answered = -Infinity;
+        if (trouble.startsWith("404") || error instanceof SignInNeeded) layout = null;
         judge();
       }
     }

@@ -1,15 +1,14 @@
-// Force, take and release from the page, with the token. Nothing is sent before it was said in full and confirmed.
+// Force, take and release from the page, as the role permits. Nothing is sent before it was said in full and confirmed.
 
-import { OPERATOR_NAME, make, number, printable, put } from "./words.js";
+import { byId, make, number, printable, put } from "./words.js";
 
 const PATIENCE = 5000;
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
-const byId = (id) => document.getElementById(id);
 
 // Each act: its button, whether it applies, what it asks for, where it goes, and what it does, in words.
 const ACTS = {
   force: {
-    title: "Force", asks: ["value", "seconds"], seconds: 60, fits: () => true,
+    title: "Force", role: "engineer", asks: ["value", "seconds"], seconds: 60, fits: () => true,
     path: ({ variable }) => `variables/${encodeURIComponent(variable.name)}/force`,
     says: ({ variable, state }, { value, for: seconds }) =>
       `Force ${variable.name} from ${number(state.value, variable.kind)} to ${value} ${variable.unit}`.trimEnd() + ` for ${seconds} s. ` +
@@ -18,38 +17,37 @@ const ACTS = {
         : "The fieldbus sees it instead of what the robot reports."),
   },
   unforce: {
-    title: "End force", asks: [], fits: ({ state }) => state.forced,
+    title: "End force", role: "engineer", asks: [], fits: ({ state }) => state.forced,
     path: ({ variable }) => `variables/${encodeURIComponent(variable.name)}/unforce`,
     says: ({ variable }) => `End the force on ${variable.name}. ` + (variable.direction === "input"
       ? `It takes its fallback at once: ${variable.fallback}.` : "The fieldbus sees what the robot reports again."),
   },
   take: {
-    title: "Take lock", asks: ["seconds"], seconds: 600, endless: true, of: "lock", fits: ({ lock }) => lock !== null,
+    title: "Take lock", role: "operator", asks: ["seconds"], seconds: 600, endless: true, of: "lock", fits: ({ lock }) => lock !== null,
     path: ({ lock }) => `locks/${encodeURIComponent(lock.name)}/take`,
     says: ({ lock, state }, { for: seconds }) =>
-      (state.owner === OPERATOR_NAME ? `Keep the lock ${lock.name}`
+      (state.operators ? `Keep the lock ${lock.name}`
         : `Take the lock ${lock.name}${state.owner ? ` from ${state.owner}` : ", which nobody owns,"}`) +
       (seconds === undefined ? " until it is released. " : ` for ${seconds} s. `) +
       `Whoever else writes what it guards is refused meanwhile: ${lock.variables.join(", ")}. ` +
-      (state.owner === OPERATOR_NAME ? "No value changes."
+      (state.operators ? "No value changes."
         : state.owner ? "All of that takes its fallback at once." : "What was only adopted of that takes its fallback at once."),
   },
   release: {
-    title: "Release lock", asks: [], of: "lock", fits: ({ state, lock }) => lock !== null && state.owner !== "",
+    title: "Release lock", role: "operator", asks: [], of: "lock", fits: ({ state, lock }) => lock !== null && state.owner !== "",
     path: ({ lock }) => `locks/${encodeURIComponent(lock.name)}/release`,
-    says: ({ lock, state }) => `Release the lock ${lock.name}, which ${state.owner === OPERATOR_NAME ? "the " : ""}${state.owner} owns. ` +
+    says: ({ lock, state }) => `Release the lock ${lock.name}, which ${state.operators ? "the " : ""}${state.owner} owns. ` +
       `What it guards takes its fallback at once: ${lock.variables.join(", ")}.`,
   },
 };
 
 export class Operate {
-  constructor() {
+  constructor(session) {
     this.dialog = byId("act");
-    this.allowed = false;
-    this.token = "";                  // kept while the page is open, and nowhere else
+    this.session = session;
     byId("act-go").addEventListener("click", () => this.go());
     byId("act-cancel").addEventListener("click", () => this.dialog.close());
-    for (const field of ["act-value", "act-seconds", "act-token"]) {
+    for (const field of ["act-value", "act-seconds"]) {
       byId(field).addEventListener("input", () => this.ask());
       byId(field).addEventListener("keydown", (event) => { if (event.key === "Enter") this.go(); });
     }
@@ -58,18 +56,27 @@ export class Operate {
   // Buttons for a variable; `subject` has the cell, the variable, its lock or null, and its state, kept up to date.
   buttons(subject) {
     const place = make("p", "acts");
-    place.hidden = !this.allowed;
     for (const [name, act] of Object.entries(ACTS)) {
       const button = make("button", "kind", `${act.title} …`);
       button.type = "button";
       button.addEventListener("click", () => this.open(name, subject));
       place.append(button);
     }
+    place.append(make("span", "lack muted"));
     return place;
   }
 
+  // What does not apply is not there; what the role may not do is disabled, with the reason beside it.
   refresh(place, subject) {
-    Object.values(ACTS).forEach((act, index) => { place.children[index].hidden = !act.fits(subject); });
+    place.hidden = !this.session.tokens;
+    const lacks = new Set();
+    Object.values(ACTS).forEach((act, index) => {
+      const button = place.children[index], lack = this.session.lack(act.role);
+      button.hidden = !act.fits(subject);
+      button.disabled = lack !== "";
+      if (lack && !button.hidden) lacks.add(lack);
+    });
+    put(place.lastChild, [...lacks].join(" "));
   }
 
   open(name, subject) {
@@ -80,7 +87,6 @@ export class Operate {
     byId("act-value").value = "";
     byId("act-seconds").value = String(this.act.seconds ?? "");
     put(byId("act-until"), this.act.endless ? "Seconds (empty: until it is released)" : "Seconds");
-    byId("act-token").value = this.token;
     this.ask();
     this.dialog.showModal();
   }
@@ -121,8 +127,8 @@ export class Operate {
   async go() {
     try {
       const body = this.body();
-      this.token = byId("act-token").value.trim();
-      if (!this.token) throw new Error("The token is missing: it is in the file that the gateway was started with.");
+      const lack = this.session.lack(this.act.role);
+      if (lack) throw new Error(lack);
       if (this.sure === null) {
         this.sure = JSON.stringify(body);
         this.owner = this.subject.state.owner;
@@ -147,7 +153,7 @@ export class Operate {
     let response;
     try {
       response = await fetch(`api/v1/${this.act.path(this.subject)}`, {
-        method: "POST", body, headers: { Authorization: `Bearer ${this.token}` }, signal: AbortSignal.timeout(PATIENCE),
+        method: "POST", body, headers: this.session.headers, signal: AbortSignal.timeout(PATIENCE),
       });
     } catch {
       throw new Error("No answer. Whether it was done is not known: look at the value.");
@@ -155,9 +161,11 @@ export class Operate {
       byId("act-go").disabled = false;
     }
     if (response.ok) return;
-    if (response.status === 401) this.token = "";
-    if (response.status === 401) throw new Error("The token is not the gateway's. Nothing was done.");
     const text = await response.text();
+    if (response.status === 401) {
+      this.close();
+      this.session.refused(text.trim());
+    }
     let words = text.trim();
     try {
       words = JSON.parse(text).error.message;

@@ -3,7 +3,7 @@
 import { areaOf, factsOf, placesOn } from "./facts.js";
 import { Groups } from "./groups.js";
 import { History } from "./history.js";
-import { FORCED, OPERATOR, OPERATOR_NAME, make, meaning, number, put, putName, quality, span } from "./words.js";
+import { FORCED, OPERATOR, byId, make, meaning, number, ownerName, put, putName, quality, span } from "./words.js";
 
 const KINDS = [
   ["all", "All", () => true],
@@ -12,7 +12,6 @@ const KINDS = [
   ["owned", "Owned", (row) => row.owner !== ""],
   ["odd", "Not good", (row) => row.code !== 0],
 ];
-const byId = (id) => document.getElementById(id);
 
 export class Variables {
   constructor(samplesPerSecond, operate) {
@@ -81,12 +80,12 @@ export class Variables {
 
   update(state, now) {
     const forces = new Map(state.forced.map(([index, ...force]) => [index, force]));
-    const owners = new Map(state.owned.map(([lock, owner, left]) => [lock, [owner, left]]));
+    const owners = new Map(state.owned.map(([lock, ...owned]) => [lock, owned]));
     this.history.add(now, state.values, state.quality);
     for (const [index, row] of this.rows.entries()) {
-      const [owner, left] = owners.get(row.variable.lock) ?? [null, null];
-      const name = owner === null ? "" : owner === OPERATOR ? OPERATOR_NAME : this.layout.writers[owner].name;
-      row.keep(name, forces.has(index), state.values[index]);
+      const [owner, left, holders] = owners.get(row.variable.lock) ?? [null, null, ""];
+      const name = owner === null ? "" : ownerName(owner, holders, this.layout.writers);
+      row.keep(name, owner === OPERATOR, forces.has(index), state.values[index]);
       row.update(state.values[index], state.quality[index], state.ages[index], name, left, forces.get(index));
     }
     const odd = this.rows.reduce((sum, row) => sum + (row.code !== 0), 0);
@@ -140,7 +139,7 @@ class Row {
     this.owner = "";
     this.code = -1;
     this.wanted = true;
-    this.state = { owner: "", forced: false, value: 0 };
+    this.state = { owner: "", operators: false, forced: false, value: 0 };
     this.detail = null;
     this.text = [variable.name, variable.robot, variable.comment,
       ...variable.places.flatMap((place) => [place.address, place.notation])].join(" ").toLowerCase();
@@ -183,7 +182,7 @@ class Row {
     const { kind, unit } = this.variable;
     put(this.value, number(value, kind));
     put(this.meaning, meaning(value, this.variable));
-    const [rest, reported, its] = force ?? [null, null, null];
+    const [rest, reported, its, by] = force ?? [null, null, null, ""];
     put(this.quality, !force ? quality(code, age)
       : code === FORCED ? `forced, ${span(rest)} left` : `${quality(code, age)}; forced, ${span(rest)} left`);
     // The truth beside the force: what the robot reports, or reads back of an input, and how good that is.
@@ -192,7 +191,7 @@ class Row {
     this.truth.classList.toggle("muted", its === 0 && reported === value);
     put(this.truth, truth && its > 0 ? `${truth}, ${quality(its, null)}` : truth);
     const words = owner && left !== null ? `${owner}, ${span(left).replaceAll(" ", "\u00a0")}` : owner;
-    const source = code === FORCED ? OPERATOR_NAME : "robot";
+    const source = code === FORCED ? ownerName(OPERATOR, by, []) : "robot";
     put(this.holder, this.variable.direction === "input" ? words || "free" : source);
     if (code !== this.code) this.element.dataset.quality = code;
     this.holder.classList.toggle("muted", !owner);
@@ -202,8 +201,8 @@ class Row {
   }
 
   // What acts on it have to know of its present state.
-  keep(owner, forced, value) {
-    Object.assign(this.state, { owner, forced, value });
+  keep(owner, operators, forced, value) {
+    Object.assign(this.state, { owner, operators, forced, value });
     if (this.detail) this.detail.operate.refresh(this.detail.acts, this.detail.subject);
   }
 

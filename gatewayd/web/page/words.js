@@ -5,6 +5,8 @@ export const FORCED = 4;
 export const OPERATOR = 254;
 export const OPERATOR_NAME = "local operator";
 
+export const byId = (id) => document.getElementById(id);
+
 export function number(value, kind) {
   if (typeof value === "boolean") return value ? "1" : "0";
   if (typeof value !== "number") return String(value);          // "NaN", "Infinity"
@@ -40,6 +42,12 @@ export function quality(code, age) {
 
 export function clock(date) {
   return date.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false });
+}
+
+// The owner of a lock: a writer, or the operator with those who act as it, where that is known.
+export function ownerName(owner, holders, writers) {
+  if (owner !== OPERATOR) return writers[owner].name;
+  return holders ? `operator (${printable(holders)})` : OPERATOR_NAME;
 }
 
 export function count(number, noun) {
