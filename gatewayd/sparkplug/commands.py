@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from gatewayd.sparkplug.actions import CommandReceived, CommandRefused
 from gatewayd.sparkplug.datatypes import Scalar, ValueField, WireValue, commanded_value
 from gatewayd.sparkplug.declarations import REBIRTH, MetricDeclaration
-from gatewayd.sparkplug.payload import DEFAULT_LIMITS, Metric, PayloadLimits, decode_payload
+from gatewayd.sparkplug.payload import Metric, PayloadLimits, decode_payload
 from gatewayd.sparkplug.roster import RosterDevice
 from gatewayd.sparkplug.wire import PayloadError
 
-COMMAND_LIMITS: PayloadLimits = DEFAULT_LIMITS
+COMMAND_LIMITS = PayloadLimits(size=8192, metrics=256, depth=0)
+"""All inputs of a robot at once are 6 KiB. The worst of this size takes some milliseconds of the loop."""
 _MAX_NAME = 80
 """Characters of a foreign name that are repeated."""
 _TRUE = WireValue(ValueField.BOOLEAN, content=True)

@@ -39,7 +39,7 @@ class PayloadLimits:
     """Bytes of a payload."""
     metrics: int = 2048
     depth: int = 8
-    """Property sets in each other."""
+    """Property sets in each other; 0 skips properties."""
 
 
 DEFAULT_LIMITS = PayloadLimits()
@@ -197,7 +197,9 @@ def _decode_metric(data: bytes, limits: PayloadLimits) -> Metric:
         is_historical=_truth(numbers.get(5)),
         is_transient=_truth(numbers.get(6)),
         is_null=_truth(numbers.get(7)),
-        properties=None if properties is None else _decode_properties(properties, limits.depth),
+        properties=_decode_properties(properties, limits.depth)
+        if properties is not None and limits.depth
+        else None,
         value=value,
     )
 

@@ -43,7 +43,7 @@ def read_fields(data: bytes) -> Iterator[tuple[int, int, Content]]:
 
 def _split(key: int) -> tuple[int, int]:
     if not 8 <= key <= MAX_UINT32:
-        raise PayloadError(f"no field has the number {key >> 3}")
+        raise PayloadError(f"has a field with the number {key >> 3}")
     return key >> 3, key & 7
 
 
@@ -57,7 +57,7 @@ def _read_content(data: bytes, position: int, wire_type: int) -> tuple[Content, 
     elif wire_type == FIXED32:
         size = 4
     else:
-        raise PayloadError(f"wire type {wire_type} where a field begins")
+        raise PayloadError(f"has wire type {wire_type} where a field begins")
     after = position + size
     if after > len(data):
         raise PayloadError(f"ends {after - len(data)} bytes too early")

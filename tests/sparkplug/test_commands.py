@@ -80,16 +80,28 @@ def test_one_fault_refuses_the_whole(fields: dict[str, Any], words: str) -> None
     assert outcome.names[0] == "start"
 
 
+def test_a_command_is_bounded() -> None:
+    outcome = read_command(DEVICE, bytes(8193)).outcome
+    assert outcome == CommandRefused("d", (), "the payload has 8193 bytes; at most 8192 are read")
+    outcome = read(*[{"name": "part", "int_value": 1}] * 257).outcome
+    assert outcome == CommandRefused("d", (), "the payload has over 256 metrics")
+
+
+def test_properties_of_a_command_are_not_looked_at() -> None:
+    payload = schema.ForeignPayload()
+    payload.metrics.add(name="part", int_value=1).properties.keys.append("without a value")
+    outcome = read_command(DEVICE, payload.SerializeToString()).outcome
+    assert outcome == CommandReceived("d", (("part", 1),), None)
+
+
 def test_a_command_that_names_nothing_is_refused() -> None:
     assert read().outcome == CommandRefused("d", (), "names no metric")
     assert read(device=ROSTER.node).outcome == CommandRefused("", (), "names no metric")
 
 
 def test_bytes_that_are_no_payload_are_refused() -> None:
-    outcome = read_command(DEVICE, b"{}").outcome
-    assert outcome == CommandRefused("d", (), "the payload ends 125 bytes too early") or isinstance(
-        outcome, CommandRefused
-    )
+    outcome = read_command(DEVICE, b'{"part": 1}').outcome
+    assert outcome == CommandRefused("d", (), "the payload ends 104 bytes too early")
 
 
 REBIRTH = {"name": "Node Control/Rebirth", "boolean_value": True}

@@ -49,7 +49,7 @@ def test_fields_of_a_message(data: str, fields: list[object]) -> None:
         ("12 ffffffffffffffffff01 61", "too early"),
         ("0d 0000", "2 bytes too early"),
         ("0001", "number 0"),
-        ("88808080 80 01 00", "no field has the number"),
+        ("88808080 80 01 00", "has a field with the number"),
         ("0c", "wire type 4"),
         ("0e", "wire type 6"),
         ("0f", "wire type 7"),

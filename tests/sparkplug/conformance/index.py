@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from tests.sparkplug.conformance.cases import CHAPTERS, STATEMENTS, Statement
@@ -14,6 +15,7 @@ ROOT = TESTS.parents[1]
 PAGE = ROOT / "docs" / "reference" / "sparkplug.md"
 
 
+@cache
 def shown() -> dict[str, list[str]]:
     """Statement -> what its tests show, and their file."""
     found: dict[str, list[str]] = {}
