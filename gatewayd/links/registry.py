@@ -24,6 +24,7 @@ LINK_KINDS = (
     "gatewayd.links.modbus_server",
     "gatewayd.links.canopen_node",
     "gatewayd.links.devices",
+    "gatewayd.links.mqtt",
 )
 """Packages, imported when they are used. Their order is that of sections in lists and tables."""
 

@@ -16,7 +16,7 @@ FAMILIES = {
     5: "ownership",
     6: "fail-safe",
     7: "lossy conversion",
-    8: "devices, dashboard server",
+    8: "devices, dashboard server, MQTT",
     9: "tests",
 }
 """Rule families by the hundreds digit of their ids."""

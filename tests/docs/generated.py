@@ -82,6 +82,10 @@ _SECTIONS = {
     "CobIdPool": "`canopen: cob_ids:`",
     "PdoSpec": "`canopen: pdos:` NAME`:`",
     "DeviceSpec": "`devices:` NAME`:`",
+    "MqttSection": "`mqtt:`",
+    "MqttTls": "`mqtt: tls:`",
+    "MqttStore": "`mqtt: store:`",
+    "SparkplugSection": "`mqtt: sparkplug:`",
     "WriterSpec": "`writers:` NAME`:`",
     "Group": "`groups:` NAME`:`",
     "VariableSpec": "`variables:` NAME`:`",
@@ -89,6 +93,7 @@ _SECTIONS = {
     "PlacementSpec": "`variables:` NAME`: modbus:`",
     "CanopenPlace": "`variables:` NAME`: canopen:`",
     "DevicePlaceSpec": "`variables:` NAME`: device:`",
+    "MqttPlaceSpec": "`variables:` NAME`: mqtt:`",
     "StepSpec": "`tests:` NAME`:`, each step",
 }
 _DURATION = re.compile(r"ms\|s\|min\|h")

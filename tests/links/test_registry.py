@@ -56,6 +56,7 @@ def test_every_kind_has_a_decoder_of_its_own() -> None:
         "modbus": Medium.TCP_SERVER,
         "canopen": Medium.CAN,
         "device": Medium.OTHER,
+        "mqtt": Medium.TCP_CLIENT,
     }
     assert decoder_of("modbus") is not decoder_of("modbus"), (
         "what one remembers is none of the other's business"

@@ -1,0 +1,1 @@
+"""Rules about brokers, topics and commands by MQTT."""

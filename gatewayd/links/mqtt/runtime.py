@@ -1,0 +1,27 @@
+"""What the daemon needs of this kind of link."""
+
+from __future__ import annotations
+
+from gatewayd.core.cell import Cell
+from gatewayd.links.contract import Context, LinkRuntime
+from gatewayd.links.mqtt.brokers import Brokers
+from gatewayd.links.mqtt.link import MqttLink
+from gatewayd.links.mqtt.plan import MqttPlan
+from gatewayd.mapping.plan import LinkPlan
+
+
+class MqttRuntime(LinkRuntime):
+    """Links, and the connections that they use."""
+
+    def share(self) -> Brokers:
+        """All connections of a daemon."""
+        return Brokers()
+
+    def make(self, plan: LinkPlan, cell: Cell, context: Context) -> MqttLink:
+        """A link; `Brokers.serve` has a connection for it."""
+        assert isinstance(plan, MqttPlan)
+        return MqttLink(plan, cell)
+
+
+RUNTIME = MqttRuntime()
+"""What the daemon needs of this kind of link."""

@@ -1,0 +1,197 @@
+"""One connection to a broker, from its first byte to its loss: an asyncio protocol around the packets."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from gatewayd.loop import clock
+from gatewayd.mqtt.engine import Engine
+from gatewayd.mqtt.messages import BrokerSettings, Message, Received
+from gatewayd.mqtt.packets import MqttProtocolError, Oversized, PacketSplitter
+from gatewayd.mqtt.waiting import WaitedMessages
+
+MAX_UNSENT = 65_536
+"""Bytes that wait in us for a slow broker; beyond them nothing is given any more."""
+MAX_TURN = 16
+"""Messages that are served before others have their turn: some 2 ms, if each of them is a command."""
+
+
+class BrokerConnection(asyncio.Protocol):
+    """Ends with `lost`, which has the reason in words; everything before is reported by the callbacks."""
+
+    def __init__(self, settings: BrokerSettings, password: str | None, will: Message | None) -> None:
+        loop = asyncio.get_running_loop()
+        self.accepted: asyncio.Future[None] = loop.create_future()
+        """The broker takes the connection; ConnectionRefusedError with its words otherwise."""
+        self.lost: asyncio.Future[str] = loop.create_future()
+        self.received: Callable[[Received], object] = lambda _message: None
+        self.oversized: Callable[[Oversized], object] = lambda _message: None
+        self.subscribed: Callable[[Sequence[str], str], object] = lambda *_each: None
+        self.passed: Callable[[bytes, bool], object] | None = None
+        """For a trace: bytes, and whether we sent them."""
+        self.writable = False
+        """Whether the broker takes what it is given."""
+        self._loop = loop
+        self._engine = Engine(settings, password, will, self._write)
+        self._engine.accepted = self._accepted
+        self._engine.refused = self._refused
+        self._engine.message = self._message
+        self._engine.subscribed = self._answered
+        self._splitter = PacketSplitter()
+        self._transport: asyncio.Transport | None = None
+        self._waited = WaitedMessages()
+        self._queue: deque[tuple[bytes | Oversized, float]] = deque()
+        """What was read and not served yet, with the seconds for which it may have waited in the socket."""
+        self._served_waited = 0.0
+
+    @property
+    def own_address(self) -> tuple[str, int] | None:
+        """Of our end."""
+        name = self._transport.get_extra_info("sockname") if self._transport is not None else None
+        return (str(name[0]), int(name[1])) if name else None
+
+    # -- called by asyncio -------------------------------------------------------------------------------------------
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Say CONNECT."""
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        transport.set_write_buffer_limits(high=MAX_UNSENT)
+        self._engine.begin()
+
+    def data_received(self, data: bytes) -> None:
+        """Serve what came; a part of it in the next turn of the loop where it is much."""
+        now = clock.judged_now()
+        if self.lost.done():
+            return
+        if self.passed is not None:
+            self.passed(data, False)
+        self._waited.read(len(data))
+        waited = self._waited.seconds(now)
+        try:
+            self._queue.extend((packet, waited) for packet in self._splitter.feed(data))
+        except MqttProtocolError as error:
+            self.end(f"not MQTT: {error}")
+            return
+        self._serve()
+        if self._queue and self._transport is not None and not self.lost.done():
+            self._transport.pause_reading()
+            self._loop.call_soon(self._serve_rest)
+
+    def pause_writing(self) -> None:
+        """The broker does not take what it is given."""
+        self.writable = False
+
+    def resume_writing(self) -> None:
+        """It does again."""
+        self.writable = self.accepted.done() and not self.lost.done()
+
+    def eof_received(self) -> None:
+        """The broker has closed."""
+        self.end("the broker has closed the connection")
+
+    def connection_lost(self, error: Exception | None) -> None:
+        """See asyncio."""
+        why = getattr(error, "strerror", None) or (str(error) if error else "")
+        self.end(why or "the broker has closed the connection")
+
+    # -- called by the client ----------------------------------------------------------------------------------------
+
+    def gap(self, since: float, until: float) -> None:
+        """The process stood still: what is read next may have waited."""
+        self._waited.gap(since, until)
+        self._queue = deque((packet, waited + until - since) for packet, waited in self._queue)
+
+    def tick(self) -> None:
+        """Pings, and whether they are answered."""
+        if self.accepted.done() and not self.lost.done():
+            try:
+                self._engine.tick()
+            except TimeoutError as error:
+                self.end(str(error))
+
+    def publish(self, message: Message) -> bool:
+        """Send it now; False: it cannot be taken, and was not."""
+        if not self.writable or self.lost.done():
+            return False
+        self._engine.publish(message)
+        return True
+
+    def subscribe(self, topics: Sequence[str], qos: int) -> None:
+        """Ask for messages."""
+        if topics and self.accepted.done() and not self.lost.done():
+            self._engine.subscribe(topics, qos)
+
+    def unsubscribe(self, topics: Sequence[str]) -> None:
+        """Ask for them no more."""
+        if topics and self.accepted.done() and not self.lost.done():
+            self._engine.unsubscribe(topics)
+
+    def leave(self) -> None:
+        """Say DISCONNECT, so that the broker keeps the will to itself, and close when all was sent."""
+        if self.accepted.done() and not self.lost.done():
+            self._engine.end()
+        if self._transport is not None:
+            self._transport.close()
+
+    def end(self, reason: str) -> None:
+        """The connection is no more, for this reason."""
+        self.writable = False
+        if not self.lost.done():
+            self.lost.set_result(reason)
+        if not self.accepted.done():
+            self.accepted.set_exception(ConnectionRefusedError(reason))
+            # Whoever waited may be gone.
+            self.accepted.exception()
+        if self._transport is not None:
+            self._transport.abort()
+
+    # -- inside ------------------------------------------------------------------------------------------------------
+
+    def _serve(self) -> None:
+        for _ in range(min(MAX_TURN, len(self._queue))):
+            if self.lost.done():
+                return
+            packet, self._served_waited = self._queue.popleft()
+            if isinstance(packet, Oversized):
+                self.oversized(packet)
+                continue
+            try:
+                self._engine.receive(packet)
+            except MqttProtocolError as error:
+                self.end(f"not MQTT: {error}")
+            except ConnectionResetError as error:
+                self.end(str(error))
+
+    def _serve_rest(self) -> None:
+        clock.judged_now()
+        self._serve()
+        if self._transport is None or self.lost.done():
+            self._queue.clear()
+        elif self._queue:
+            self._loop.call_soon(self._serve_rest)
+        else:
+            self._transport.resume_reading()
+
+    def _write(self, data: bytes) -> None:
+        if self._transport is None or self._transport.is_closing():
+            return
+        if self.passed is not None:
+            self.passed(data, True)
+        self._transport.write(data)
+
+    def _accepted(self) -> None:
+        if not self.accepted.done():
+            self.writable = True
+            self.accepted.set_result(None)
+
+    def _refused(self, why: str) -> None:
+        self.end(f"the broker refuses the connection: {why}")
+
+    def _answered(self, topics: Sequence[str], why: str) -> None:
+        self.subscribed(topics, why)
+
+    def _message(self, topic: str, payload: bytes, retained: bool, again: bool) -> None:
+        self.received(Received(topic, payload, retained, again, self._served_waited))
