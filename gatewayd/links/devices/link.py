@@ -32,6 +32,7 @@ class DeviceLink(Link):
 
     def __init__(self, plan: DevicePlan, cell: Cell, peer: str) -> None:
         self._progress = 0
+        self._stopping = False
         inputs = self._join(plan, cell)
         self._inflow = Inflow(cell, plan.writer, peer, inputs, plan.lost_after)
         self._outflow = Outflow(cell, plan.sendings, self._send)
@@ -111,6 +112,10 @@ class DeviceLink(Link):
         """Have what changed last ready to be sent."""
         self._outflow.update(now)
 
+    def stop(self) -> None:
+        """The gateway stops: that the device is asked no more is no loss to be reported."""
+        self._stopping = True
+
     # -- for the family -------------------------------------------------------------------------------------------
 
     def _on_image(self, direction: Direction) -> None:
@@ -124,6 +129,10 @@ class DeviceLink(Link):
             log.warning(
                 "values of a device are lost", extra=fields(**self._device_names(), values=self._called(late))
             )
+
+    def _report_loss(self, reason: str) -> None:
+        if not self._stopping:
+            log.warning("device lost", extra=fields(**self._device_names(), reason=reason))
 
     def _called(self, variables: Collection[int]) -> str:
         known = self._cell.definition.variables

@@ -108,6 +108,8 @@ class CanopenBuses(SharedPart):
         buses = list(self.buses.values())
         self.buses.clear()
         for bus in buses:
+            for link in bus.links.values():
+                link.stop()
             self._detach_all(bus)
         await end_all(bus.work for bus in buses)
 

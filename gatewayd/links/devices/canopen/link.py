@@ -151,7 +151,7 @@ class CanopenDeviceLink(ManagedDevice):
 
     def node_ended(self, reason: str, now: float) -> None:
         """It is lost as a writer, and nothing is sent to it."""
-        log.warning("device lost", extra=fields(**self._device_names(), reason=reason))
+        self._report_loss(reason)
         self.losses += 1
         self._forget()
         self._inflow.lose(reason, now)

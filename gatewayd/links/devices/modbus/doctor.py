@@ -67,7 +67,7 @@ def serial_port(line: LineAddress) -> Observation:
 
 
 async def _connection(line: LineAddress) -> Observation:
-    """Open a connection and close it again: whoever listens is asked nothing."""
+    """Open a connection and close it again: the peer is asked nothing."""
     check = "connection"
     try:
         async with asyncio.timeout(_PATIENCE):

@@ -39,6 +39,9 @@ class DeviceOnLine(Protocol):
     def begin_anew(self) -> None:
         """Have a station that was on no line yet."""
 
+    def stop(self) -> None:
+        """The gateway stops."""
+
 
 @dataclass(eq=False, slots=True)
 class _LineAtWork:
@@ -65,6 +68,7 @@ class ModbusLines(SharedPart):
         self.lines: dict[LineAddress, _LineAtWork] = {}
         self._group = WorkGroup()
         self._tap: Tap | None = None
+        self._devices: list[DeviceOnLine] = []
 
     async def run(self) -> None:
         """Keep all lines at work until cancelled."""
@@ -95,8 +99,8 @@ class ModbusLines(SharedPart):
     def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
         """Have a line for every address of these devices, and no other; each with its devices and no others."""
         wanted: dict[LineAddress, list[DeviceOnLine]] = {}
-        for link in links:
-            device = cast("DeviceOnLine", link)
+        self._devices = [cast("DeviceOnLine", link) for link in links]
+        for device in self._devices:
             wanted.setdefault(device.plan.line, []).append(device)
         for address, line in list(self.lines.items()):
             if address not in wanted or line.runner.line.settings != settings_of(wanted[address]):
@@ -113,6 +117,8 @@ class ModbusLines(SharedPart):
 
     async def close(self) -> None:
         """Ask nobody any more."""
+        for device in self._devices:
+            device.stop()
         lines = list(self.lines.values())
         self.lines.clear()
         for line in lines:

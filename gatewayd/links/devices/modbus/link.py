@@ -181,7 +181,7 @@ class ModbusDeviceLink(DeviceLink):
             log.info("device answers", extra=fields(**self._device_names()))
             self._outflow.connect(now)
         else:
-            log.warning("device lost", extra=fields(**self._device_names(), reason=reason))
+            self._report_loss(reason)
             self._inflow.lose(reason, now)
             self._outflow.lose()
         self._publish(now)

@@ -7,6 +7,8 @@ from contextlib import suppress
 from dataclasses import replace
 from uuid import uuid4
 
+import pytest
+
 from gatewayd.core.cell import Cell
 from gatewayd.links.devices.canopen.buses import CanopenBuses
 from gatewayd.links.devices.canopen.link import CanopenDeviceLink
@@ -34,6 +36,17 @@ async def test_devices_of_two_cells_have_one_manager_and_the_second_of_a_node_no
         buses.serve([], {})
         assert buses.buses == {}
         assert one.manager is None
+
+
+async def test_the_end_of_the_gateway_is_no_loss_of_a_device(caplog: pytest.LogCaptureFixture) -> None:
+    channel = str(uuid4())
+    plan = planned(channel=channel)
+    link = link_of(plan, Cell(plan.cell))
+    async with an_encoder(channel), managed([link]) as buses:
+        await until(lambda: link.health().figures["state"] == "good")
+        await buses.close()
+        assert link.node is None
+    assert "device lost" not in caplog.text
 
 
 async def test_bus_that_changes_begins_anew() -> None:

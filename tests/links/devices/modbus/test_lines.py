@@ -193,3 +193,13 @@ def test_a_cell_of_its_own_is_no_matter() -> None:
     lines.serve([rig.links["one"], other.links["two"]], {})
     assert len(lines.lines) == 1
     assert isinstance(rig.robot.cell, Cell)
+
+
+def test_the_end_of_the_gateway_is_no_loss_of_a_device(caplog: pytest.LogCaptureFixture) -> None:
+    async def scenario(_units: Units, rig: Rig, lines: ModbusLines) -> None:
+        await until(lambda: (rig.robot.value("one"), rig.robot.value("two")) == (1, 2))
+        await lines.close()
+        assert rig.links["one"].station.state is UnitState.LOST
+
+    played(scenario)
+    assert [record.getMessage() for record in caplog.records if record.levelname == "WARNING"] == []
