@@ -53,3 +53,12 @@ def test_log_lines_of_every_form_are_found() -> None:
 
 def test_every_golden_file_belongs_to_a_contract() -> None:
     assert {path.stem for path in GOLDEN.iterdir()} == set(CONTRACTS)
+
+
+def test_no_field_of_the_log_has_a_name_of_the_record_itself() -> None:
+    """The JSON log leaves such a field out: `level` of what the controller says was that of the line."""
+    calls = json.loads((GOLDEN / "log-calls.json").read_text())
+    taken = {"time", "level", "logger", "event"}
+    assert [
+        text for text, forms in calls.items() if any(taken & set(form.split()[1:]) for form in forms)
+    ] == []

@@ -38,7 +38,7 @@ def report_text(cell: str, message: TextMessage) -> None:
     """The controller says something."""
     log.warning(
         "the controller says",
-        extra=fields(cell=cell, text=message.message, source=message.source or None, level=message.level),
+        extra=fields(cell=cell, text=message.message, source=message.source or None, severity=message.level),
     )
 
 
