@@ -56,7 +56,7 @@ class Abort(Exception):
         super().__init__(f"{code:#010x} {code.name}")
         self.code = code
         self.recorded = recorded
-        """Whoever refuses has recorded it already: `aborted` of the server is not called."""
+        """The object that refuses has recorded it already: `aborted` of the server is not called."""
 
 
 class Pending:

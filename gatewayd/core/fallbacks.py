@@ -17,7 +17,7 @@ _NOT_READABLE = "the robot does not say what it holds"
 
 @dataclass(slots=True, eq=False)
 class Fallbacks:
-    """The fallbacks of one cell's inputs. Whoever calls it says afterwards that inputs have changed."""
+    """The fallbacks of one cell's inputs. The caller says afterwards that inputs have changed."""
 
     _definition: CellDefinition
     _image: ProcessImage

@@ -15,7 +15,7 @@ from typing import Final, Protocol, TypeVar, cast
 
 from gatewayd.dashboard.dialogue import Dialogue, DialogueError
 from gatewayd.dashboard.replies import CommandOutcome, DashboardReply, reply_to
-from gatewayd.dashboard.requests import SENT_WITHIN, TOLD_WITHIN, DashboardRequest, StateQuestion
+from gatewayd.dashboard.requests import ANSWERED_WITHIN, SENT_WITHIN, DashboardRequest, StateQuestion
 from gatewayd.dashboard.state import RobotState, Round
 from gatewayd.loop import clock
 from gatewayd.loop.connect import DeadPeer, connect
@@ -36,12 +36,12 @@ StreamTap = Callable[[bytes, bool, tuple[str, int] | None], None]
 
 
 class DashboardHandler(Protocol):
-    """Whoever uses the client; called from its task. Must not raise."""
+    """The user of the client; called from its task. Must not raise."""
 
     def connected(self) -> None:
         """The server has greeted: commands can be given."""
 
-    def told(self, state: RobotState) -> None:
+    def state_read(self, state: RobotState) -> None:
         """A round of questions was answered."""
 
     def answered(self, request: DashboardRequest, reply: DashboardReply) -> None:
@@ -136,12 +136,12 @@ class DashboardClient:
             words: dict[StateQuestion, str | None] = {}
             for question in asked.questions:
                 await self._obey(line)
-                answer = await self._exchange(line, question.value, TOLD_WITHIN)
+                answer = await self._exchange(line, question.value, ANSWERED_WITHIN)
                 words[question] = asked.answered(question, answer)
             # A controller that knows none of the questions is commanded all the same.
             await self._obey(line)
             state = asked.state(words)
-            self._handler.told(state)
+            self._handler.state_read(state)
             if was_local and state.remote:
                 # A connection from local control goes on to be refused: the robot itself asks for another one.
                 self._again = True
@@ -177,7 +177,7 @@ class DashboardClient:
         self._answered(request, reply_to(request.command, answer))
 
     def _expire(self) -> None:
-        """The answer to a question has kept a command waiting for too long: whoever gave it need not wait for both."""
+        """The answer to a question has kept a command waiting for too long: its giver need not wait for both."""
         if self._next is not None and not self._is_sent:
             self._given.clear()
             self._answered(self._next, DashboardReply(CommandOutcome.NOT_SENT, ""))

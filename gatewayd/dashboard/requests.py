@@ -44,7 +44,7 @@ LOADED_WITHIN = 120.0
 """Seconds within which `load` is answered: when program and installation have been loaded."""
 SENT_WITHIN = 0.5
 """Seconds for which a command may wait for the answer to a question before it; nobody expects it later."""
-TOLD_WITHIN = 5.0
+ANSWERED_WITHIN = 5.0
 """Seconds within which questions are answered, by a controller that is busy too."""
 
 

@@ -125,7 +125,7 @@ class Scan:
         return ""
 
     def remarks(self, running: Sequence[RunningCell]) -> Sequence[str]:
-        """What whoever scans has to know before."""
+        """What the user has to know before a scan."""
         return ()
 
     def run(self) -> AsyncIterator[FoundDevice | int]:

@@ -19,7 +19,7 @@ class RemarkKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SheetRemark:
-    """What whoever takes a proposal over has to know."""
+    """What the user of a proposal has to know."""
 
     line: int
     """Of the data sheet, from 1."""

@@ -64,7 +64,7 @@ class Connection(asyncio.BufferedProtocol):
         self._statistics = statistics
         self._codec = ClientProtocol()
         self.sender = PackageSender(self._codec)
-        """The way out, and whoever looks on."""
+        """The way out, and its observer."""
         self.receiver = PackageReceiver(self.buffer_updated, self._interrupted)
         """The way in, and who reads it."""
         self._negotiation = Negotiation(settings)

@@ -149,7 +149,7 @@ _MOVING = frozenset({SafetyStatus.NORMAL, SafetyStatus.REDUCED})
 
 
 class RobotModes:
-    """The modes of one controller, kept in its store. Whoever writes those fields directly changes nothing else."""
+    """The modes of one controller, kept in its store. A direct write to those fields changes nothing else."""
 
     def __init__(self, store: FieldStore, rate: float) -> None:
         self._store = store

@@ -45,7 +45,7 @@ class FieldStore:
         initial: Mapping[str, float | Vector],
     ) -> None:
         self.moment = ControllerMoment(0, 0.0, 0.0, 0.0)
-        """Now. Whoever sets it makes the moving fields follow."""
+        """Now. Who sets it also moves the fields that follow it."""
         self.edition = 0
         """Changes whenever a value may have: part of the key under which packages are kept."""
         self._types = dict(types)

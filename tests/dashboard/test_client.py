@@ -34,7 +34,7 @@ class Notes:
         self.connections += 1
         self._changed.set()
 
-    def told(self, state: RobotState) -> None:
+    def state_read(self, state: RobotState) -> None:
         self.states.append(state)
         self._changed.set()
 
@@ -192,7 +192,7 @@ async def test_a_server_that_knows_no_question_is_commanded_at_once() -> None:
 
 
 async def test_silence_ends_the_connection(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "TOLD_WITHIN", 0.05)
+    monkeypatch.setattr(module, "ANSWERED_WITHIN", 0.05)
     async with scripted(lambda _: b"") as port, running(port) as (client, notes):
         await notes.until(lambda: bool(notes.losses))
         assert notes.losses[0] == "no answer to `robotmode` within 0.05 s"
@@ -208,7 +208,7 @@ async def test_silence_ends_the_connection(monkeypatch: pytest.MonkeyPatch) -> N
     ],
 )
 async def test_another_server_is_none(greeting: bytes, why: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "TOLD_WITHIN", 0.05)
+    monkeypatch.setattr(module, "ANSWERED_WITHIN", 0.05)
     async with scripted(lambda _: b"", greeting) as port, running(port) as (_client, notes):
         await notes.until(lambda: bool(notes.losses))
         assert any(word in notes.losses[0] for word in why.split("|"))

@@ -116,7 +116,7 @@ class Station:
         """Write as soon as the line is free; the newest wins for each key (`writes`).
 
         With `repeat` it is written again every so many seconds until another write, or `cancel`, has the key. Returns
-        False, and forgets it, while the unit is not online: whoever asks decides on `state_changed` what to write then.
+        False, and forgets it, while the unit is not online: the caller decides on `state_changed` what to write then.
         """
         if self.state is not UnitState.ONLINE:
             self.counters.dropped_writes += 1

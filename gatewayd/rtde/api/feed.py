@@ -133,7 +133,7 @@ class RobotFeed(ConnectionObserver):
         return tuple(each for each in session.unavailable if (each.field, each.output) in names)
 
     def give_up(self, error: Exception, state: ConnectionState) -> None:
-        """No session is tried for any more: whoever waits gets `error`; readers the end if it was `state` CLOSED."""
+        """No session is tried for any more: waiting callers get `error`; readers the end if it was `state` CLOSED."""
         self.state, self.failure = state, error
         self._end_session()
         closed = state is ConnectionState.CLOSED

@@ -1,4 +1,4 @@
-"""Bounded buffers between the connection and whoever iterates: what is lost is counted and reported, never silent."""
+"""Bounded buffers between the connection and the program: what is lost is counted and reported, never silent."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class BoundedStream(Generic[_Item]):
             self._wake()
 
     def end(self, error: Exception | None = None) -> None:
-        """No more items come; whoever waits gets `error`, or the end."""
+        """No more items come; waiting callers get `error`, or the end."""
         self._ended, self._error = True, error
         if self._waiter is not None:
             self._wake()

@@ -76,7 +76,7 @@ class _Visit:
     def connected(self) -> None:
         pass
 
-    def told(self, state: RobotState) -> None:
+    def state_read(self, state: RobotState) -> None:
         self._end(state)
 
     def answered(self, request: DashboardRequest, reply: DashboardReply) -> None:

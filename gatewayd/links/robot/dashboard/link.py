@@ -26,7 +26,7 @@ from gatewayd.links.robot.dashboard.declaration import RESULT_WORD, STATE_WORD
 from gatewayd.links.robot.dashboard.plan import DashboardPlan
 from gatewayd.links.robot.dashboard.reports import RefusalReports
 from gatewayd.links.robot.dashboard.results import BY_OBSTACLE, BY_OUTCOME, CommandResult
-from gatewayd.links.robot.dashboard.told import values_of
+from gatewayd.links.robot.dashboard.state_values import values_of
 from gatewayd.links.robot.dashboard.variables import OWN, VERBS, VIA, name_of
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
@@ -184,7 +184,7 @@ class DashboardLink(Link):
         self._cell.carried.begin(VIA, now)
         self._show_own(now)
 
-    def told(self, state: RobotState) -> None:
+    def state_read(self, state: RobotState) -> None:
         """A round of questions was answered."""
         now = clock.judged_now()
         self._state, self._told_at = state, now

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gatewayd.dashboard.state import RobotState
 from gatewayd.links.robot.dashboard.plan import DashboardPlan
-from gatewayd.links.robot.dashboard.told import values_of
+from gatewayd.links.robot.dashboard.state_values import values_of
 
 PLAN = DashboardPlan("127.0.0.1", 29999, 0.5, ((4, "pick.urp"),))
 
