@@ -257,7 +257,8 @@ class CanLink(Link, Observer):
         if abs(offset - self._offset) > CLOCK_STEP:
             self._offset = offset
             log.info(
-                "network time", extra=fields(**self._names(), time=moment.isoformat(timespec="milliseconds"))
+                "network time",
+                extra=fields(**self._names(), bus_time=moment.isoformat(timespec="milliseconds")),
             )
 
     def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
