@@ -71,7 +71,7 @@ class StatusListener:
         self._access = access
         self._host, self._port = access.settings.host, access.settings.port
         self._probes = probes
-        self._exposition = Exposition(probes, __version__)
+        self._exposition = Exposition(probes, __version__, access)
         self._has_api = api is not None
         self._doors: Doors | None = None
         self._share = api[0].share if api is not None else LoopShare()

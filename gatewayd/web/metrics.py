@@ -26,6 +26,7 @@ from gatewayd.links.registry import kind_of, kinds
 from gatewayd.loop import clock
 from gatewayd.report.printable import printable
 from gatewayd.service.cell_runtime import CellRuntime
+from gatewayd.web.access_control import AccessControl
 from gatewayd.web.histogram import Histogram
 from gatewayd.web.probes import CellProbe, Probes
 
@@ -163,6 +164,12 @@ METRICS = (
         "gatewayd_troubles",
         "problems that belong to no single cell, such as a mapping not served or a reload refused; /readyz names them",
     ),
+    _info("gatewayd_listener_refusals_total", "what the status listener refused, by reason", "reason"),
+    _info("gatewayd_token_expiry_timestamp_seconds", "when the token ends, seconds since 1970", "token"),
+    _info(
+        "gatewayd_listener_certificate_expiry_timestamp_seconds",
+        "when the certificate of the status listener ends, seconds since 1970",
+    ),
     _info(
         "gatewayd_loop_lag_seconds", "by how much the event loop was late, ten times a second", kind=_TIMES
     ),
@@ -204,9 +211,10 @@ _HistogramsOf = defaultdict[str, dict[tuple[str, ...], Histogram]]
 class Exposition:
     """Makes the text that Prometheus reads."""
 
-    def __init__(self, probes: Probes, version: str) -> None:
+    def __init__(self, probes: Probes, version: str, access: AccessControl | None = None) -> None:
         self._probes = probes
         self._version = version
+        self._access = access
         self._process = ProcessCollector(registry=None)
 
     def text(self) -> Generator[None, None, bytes]:
@@ -230,6 +238,8 @@ class Exposition:
         samples["gatewayd_ready"] = {(): ready}
         samples["gatewayd_parts_hanging"] = {(): len(probes.late)}
         samples["gatewayd_troubles"] = {(): len(troubles)}
+        if self._access is not None:
+            samples |= _of_access(self._access)
         histograms: _HistogramsOf = defaultdict(dict)
         histograms["gatewayd_loop_lag_seconds"] = {(): probes.lag}
         for runtime in daemon.runtimes:
@@ -259,6 +269,18 @@ class _Alone(CollectorRegistry):
 
 def _lines(metric: Metric) -> bytes:
     return generate_latest(_Alone(metric))
+
+
+def _of_access(access: AccessControl) -> _SamplesOf:
+    found: _SamplesOf = defaultdict(dict)
+    found["gatewayd_listener_refusals_total"] = {(reason,): count for reason, count in access.refused.items()}
+    if access.credentials is not None:
+        ends = {(token.name,): token.expires for token in access.credentials.tokens.tokens}
+        found["gatewayd_token_expiry_timestamp_seconds"] = ends
+    if access.identity is not None and access.identity.chain:
+        end = access.identity.chain[0].not_after
+        found["gatewayd_listener_certificate_expiry_timestamp_seconds"] = {(): end}
+    return found
 
 
 def _samples(first: str, value: _Value, *last: str) -> _Samples:

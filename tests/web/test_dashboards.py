@@ -14,6 +14,7 @@ from ruamel.yaml import YAML
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.web.access_control import REFUSALS
 from gatewayd.web.metrics import LINK_LABEL, METRICS, PROCESS_METRICS, MetricKind
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -39,7 +40,7 @@ ASKED = re.compile(r"\b(gatewayd_\w+|process_\w+|up)\b(?:\{([^}]*)\})?")
 VALUES: dict[str, set[str]] = {
     "quality": {one.name.lower() for one in Quality},
     "state": {one.name.lower() for one in Source},
-    "reason": {one.name.lower() for one in Reason},
+    "reason": {one.name.lower() for one in Reason} | set(REFUSALS),
 }
 
 

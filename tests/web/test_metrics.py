@@ -16,8 +16,11 @@ from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
+from gatewayd.web.access_control import AccessControl
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS, Exposition, MetricKind
 from gatewayd.web.probes import Probes
+from gatewayd.web.settings import settings
+from tests.machine.authority import OPENSSL, Authority
 from tests.web.press import MAPPING
 from tests.works import finished
 
@@ -28,10 +31,13 @@ ONLY_WITH_DEVICES = {
     info.name for info in METRICS if info.name.startswith(("gatewayd_device_", "gatewayd_dashboard_"))
 }
 
+ONLY_WITH_TLS = {"gatewayd_listener_certificate_expiry_timestamp_seconds"}
 
-def read(probes: Probes) -> Samples:
+
+def read(probes: Probes, access: AccessControl | None = None) -> Samples:
     found: Samples = {}
-    for family in text_string_to_metric_families(finished(Exposition(probes, "1.2.3").text()).decode()):
+    text = finished(Exposition(probes, "1.2.3", access).text()).decode()
+    for family in text_string_to_metric_families(text):
         for sample in family.samples:
             found.setdefault(sample.name, {})[tuple(sorted(sample.labels.items()))] = sample.value
     return found
@@ -41,7 +47,7 @@ def one(samples: Samples, name: str, **labels: str) -> float:
     return samples[name][tuple(sorted(labels.items()))]
 
 
-def test_everything_that_is_listed_is_told_and_nothing_else(probes: Probes) -> None:
+def test_everything_that_is_listed_is_told_and_nothing_else(probes: Probes, access: AccessControl) -> None:
     names = set()
     for info in METRICS:
         names |= (
@@ -49,11 +55,27 @@ def test_everything_that_is_listed_is_told_and_nothing_else(probes: Probes) -> N
             if info.kind is MetricKind.HISTOGRAM
             else {info.name}
         )
-    assert set(read(probes)) == names - ONLY_WITH_CAN - ONLY_WITH_DEVICES | set(PROCESS_METRICS)
+    always = names - ONLY_WITH_CAN - ONLY_WITH_DEVICES - ONLY_WITH_TLS
+    assert set(read(probes, access)) == always | set(PROCESS_METRICS)
 
 
-def test_labels_are_those_that_are_listed(probes: Probes) -> None:
-    samples = read(probes)
+@pytest.mark.skipif(OPENSSL is None, reason="openssl is not installed")
+def test_when_tokens_and_certificate_end(probes: Probes, token_file: Path, tmp_path: Path) -> None:
+    certificate, key = Authority(tmp_path).issue("gateway", days=90)
+    access = AccessControl(settings("127.0.0.1:0", token_file, certificate, key))
+    access.refresh()
+    access.refused["wrong_token"] += 3
+    samples = read(probes, access)
+    assert one(samples, "gatewayd_listener_refusals_total", reason="wrong_token") == 3
+    assert one(samples, "gatewayd_listener_refusals_total", reason="host") == 0
+    end = one(samples, "gatewayd_token_expiry_timestamp_seconds", token="anna")  # noqa: S106 - its name
+    assert 3500 < end - time.time() <= 3600
+    (name,) = ONLY_WITH_TLS
+    assert 89 < (one(samples, name) - time.time()) / 86400 <= 90
+
+
+def test_labels_are_those_that_are_listed(probes: Probes, access: AccessControl) -> None:
+    samples = read(probes, access)
     for info in METRICS:
         name = f"{info.name}_count" if info.kind is MetricKind.HISTOGRAM else info.name
         for labels in samples.get(name, {}):
