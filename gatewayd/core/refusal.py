@@ -33,6 +33,8 @@ class Reason(IntEnum):
     """It would change a bit that only shares a register with what the writer owns."""
     CONTRADICTED = 12
     """The request gives a variable two values."""
+    NOT_IN_ROLE = 13
+    """The role of the peer has no right to it."""
 
     @property
     def text(self) -> str:
@@ -62,21 +64,23 @@ _TEXTS = {
     Reason.WAITED: "it waited while the gateway stood still",
     Reason.NOT_MEANT: "bit or byte of a shared register that the writer does not own",
     Reason.CONTRADICTED: "one request gave it two values",
+    Reason.NOT_IN_ROLE: "its role has no right to it",
 }
 
 PRECEDENCE = {
     Reason.NO_SUCH_ADDRESS: 0,
-    Reason.NOT_WRITABLE: 1,
-    Reason.PARTIAL_VALUE: 2,
-    Reason.CONTRADICTED: 3,
-    Reason.OUT_OF_LIMITS: 4,
-    Reason.HEARTBEAT_LOST: 5,
-    Reason.WAITED: 6,
-    Reason.ROBOT_LOST: 7,
-    Reason.CLAIMED_ELSEWHERE: 8,
-    Reason.PARTIAL_TAKEOVER: 9,
-    Reason.HELD: 10,
-    Reason.NOT_MEANT: 11,
+    Reason.NOT_IN_ROLE: 1,
+    Reason.NOT_WRITABLE: 2,
+    Reason.PARTIAL_VALUE: 3,
+    Reason.CONTRADICTED: 4,
+    Reason.OUT_OF_LIMITS: 5,
+    Reason.HEARTBEAT_LOST: 6,
+    Reason.WAITED: 7,
+    Reason.ROBOT_LOST: 8,
+    Reason.CLAIMED_ELSEWHERE: 9,
+    Reason.PARTIAL_TAKEOVER: 10,
+    Reason.HELD: 11,
+    Reason.NOT_MEANT: 12,
 }
 """Which reason is reported when several apply: what can never work first, what may pass soon last. A lost heartbeat
 stands before the robot's absence, which leaves an owner its lease: who is not heard keeps nothing alive."""

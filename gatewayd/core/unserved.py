@@ -18,6 +18,7 @@ class Unserved(IntEnum):
     MALFORMED = 4
     NOT_ALLOWED = 5
     ROBOT_LOST = 6
+    NOT_IN_ROLE = 7
 
     @property
     def text(self) -> str:
@@ -32,4 +33,5 @@ _TEXTS = {
     Unserved.MALFORMED: "quantity, length or value out of range",
     Unserved.NOT_ALLOWED: "not readable, or not writable",
     Unserved.ROBOT_LOST: "held back without the robot",
+    Unserved.NOT_IN_ROLE: "no right to it by role",
 }

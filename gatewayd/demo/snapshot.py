@@ -44,6 +44,7 @@ _EXCEPTIONS = {
     Reason.WAITED: "06",
     Reason.NOT_MEANT: "06",
     Reason.CONTRADICTED: "03",
+    Reason.NOT_IN_ROLE: "01",
 }
 _EMERGENCIES = {
     Reason.NOT_WRITABLE: "FF05h",

@@ -389,6 +389,10 @@ class SharedPart:
     def trace(self, tap: Tap | None) -> None:
         """See `Link.trace`: of what passes this part and not a link of one cell."""
 
+    async def refresh(self) -> Sequence[str]:
+        """A reload was asked for: look at files beside the mapping; returns what is wrong with them."""
+        return ()
+
     async def prepare(self, plans: Sequence[Plan]) -> Prepared:
         """Have ready what these plans need besides what there is. Raises PrepareError."""
         raise NotImplementedError

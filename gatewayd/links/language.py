@@ -64,6 +64,8 @@ class LinkLanguage:
     """Keys of a variable by this kind that come after those."""
     writer_keys: ClassVar[type[Section] | None] = None
     """Keys that a writer has by this kind; the one called `key` says how it is known."""
+    writer_also_by: ClassVar[tuple[str, ...]] = ()
+    """Other keys of a writer that say, without that one, how it is known."""
     rules: ClassVar[tuple[str, ...]] = ()
     """Modules whose import enters the kind's rules."""
     tables: ClassVar[str] = ""

@@ -15,6 +15,7 @@ from itertools import pairwise
 
 from gatewayd.machine.der import (
     GENERALIZED_TIME,
+    INTEGER,
     OCTET_STRING,
     SEQUENCE,
     SET,
@@ -64,6 +65,7 @@ class Certificate:
     not_after: float
     extensions: tuple[Extension, ...] = ()
     """In their order; one identifier may be there several times, which RFC 5280 forbids and the reader may judge."""
+    serial: int = 0
 
     def of(self, wanted: str) -> list[Extension]:
         """The extensions with this identifier."""
@@ -123,7 +125,7 @@ def _parse(der: bytes) -> Certificate:
         del parts[0]
     if len(parts) < 6:
         raise DerError("parts are missing")
-    _serial, _algorithm, issuer, validity, subject, _key, *optional = parts
+    serial, _algorithm, issuer, validity, subject, _key, *optional = parts
     times = list(validity.expect(SEQUENCE))
     if len(times) != 2:
         raise DerError("a validity without two times")
@@ -132,9 +134,10 @@ def _parse(der: bytes) -> Certificate:
         _name(subject),
         subject.whole,
         issuer.whole,
-        _time(times[0]),
-        _time(times[1]),
+        time_of(times[0]),
+        time_of(times[1]),
         tuple(map(_extension, only(extensions[0].content).expect(SEQUENCE))) if extensions else (),
+        int.from_bytes(serial.expect(INTEGER).content, "big", signed=True),
     )
 
 
@@ -152,7 +155,7 @@ def _name(name: Element) -> str:
     return ", ".join(shown) or "without a name"
 
 
-def _time(element: Element) -> float:
+def time_of(element: Element) -> float:
     """UTCTime or GeneralizedTime (RFC 5280, 4.1.2.5): UTC, with seconds."""
     form = _TIMES.get(element.tag)
     if form is None:

@@ -57,7 +57,10 @@ WRITER: Final = _with(
     judge=_known,
     schema_extra={
         "anyOf": [
-            {"required": [language.key]} for language in languages() if language.writer_keys is not None
+            {"required": [key]}
+            for language in languages()
+            if language.writer_keys is not None
+            for key in (language.key, *language.writer_also_by)
         ]
     },
 )

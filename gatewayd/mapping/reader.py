@@ -291,7 +291,9 @@ class _Reader:
             place = key if rule is syntax.MISSING_KEY else value
             self._find(rule, context["message"], place, context["hint"])
             return
-        inner = _of(_NESTED, model, str(path[0])) or model if len(path) > 1 else model
+        inner = model
+        for step in path[:-1]:
+            inner = _of(_NESTED, inner, str(step)) or inner
         name = next((step for step in reversed((*prefix, *path)) if isinstance(step, str)), entry.key.text)
         text = _echo(_node_at(entry.value, path))
         if kind == "missing" and isinstance(path[-1], str):

@@ -95,7 +95,7 @@ class ReloadOutcome:
         changes = "; ".join(self.changes)
         match self.result:
             case Result.UNCHANGED:
-                return "reload: nothing has changed"
+                return "reload: nothing has changed" + (f" (but {reasons})" if reasons else "")
             case Result.APPLIED:
                 return f"reloaded: {changes}" + (f" (but {reasons})" if reasons else "")
             case Result.REFUSED:
@@ -200,12 +200,18 @@ class Reloader:
         if reasons:
             return ReloadOutcome(Result.FAILED, reasons)
         plans = compiled.plans
+        problems = await self._daemon.shared.refresh()
         differences = self._compare(plans)
         if not differences:
-            return ReloadOutcome(Result.UNCHANGED)
+            return ReloadOutcome(Result.UNCHANGED, problems)
         outcome = await self._swap(plans, differences, accept)
         summaries = (change if isinstance(change, str) else change.summary for change in differences)
-        return replace(outcome, changes=tuple(summaries), details=tuple(_details(differences)))
+        return replace(
+            outcome,
+            reasons=(*outcome.reasons, *problems),
+            changes=tuple(summaries),
+            details=tuple(_details(differences)),
+        )
 
     async def _swap(
         self, plans: Sequence[Plan], differences: Sequence[Changes | str], accept: frozenset[ObjectionKind]

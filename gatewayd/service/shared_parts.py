@@ -60,6 +60,10 @@ class SharedParts:
         """What these plans would take from who uses the parts, each with the cell that it concerns."""
         return (found for part in self for found in part.disturbs(plans))
 
+    async def refresh(self) -> tuple[str, ...]:
+        """Look at files beside the mappings; returns what is wrong with them."""
+        return tuple([problem for part in self for problem in await part.refresh()])
+
     async def prepare(self, plans: Sequence[Plan]) -> AllPrepared:
         """Have ready what these plans need. Raises PrepareError, and nothing has changed."""
         for plan in plans:

@@ -17,6 +17,7 @@ def test_the_numbers_of_the_status_block_stay() -> None:
         ("WAITED", 10),
         ("NOT_MEANT", 11),
         ("CONTRADICTED", 12),
+        ("NOT_IN_ROLE", 13),
     ]
 
 
@@ -32,6 +33,7 @@ def test_what_can_never_work_is_told_before_what_may_pass() -> None:
         Reason.PARTIAL_VALUE,
         Reason.CONTRADICTED,
         Reason.OUT_OF_LIMITS,
+        Reason.NOT_IN_ROLE,
     }
     assert set(sorted(Reason, key=PRECEDENCE.__getitem__)[: len(never)]) == never
 

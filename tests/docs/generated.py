@@ -73,6 +73,8 @@ _SECTIONS = {
     "Watchdog": "`robot: watchdog:`",
     "DashboardSection": "`robot: dashboard:`",
     "Modbus": "`modbus:`",
+    "Tls": "`modbus: tls:`",
+    "RoleSpec": "A role: `modbus: tls: roles:` and `without_role`",
     "Canopen": "`canopen:`",
     "IdentitySpec": "`canopen: identity:`",
     "Sync": "`canopen: sync:`",

@@ -20,7 +20,7 @@ def test_keys_come_in_the_order_of_the_kinds() -> None:
         "on_release", "on_stale", "valid", "deadband", "unit", "comment",
     ]  # fmt: skip
     assert list(WRITER.model_fields) == [
-        "modbus", "canopen", "pdos", "node", "heartbeat", "guarding", "device", "timeout", "timeout_counts",
+        "modbus", "role", "canopen", "pdos", "node", "heartbeat", "guarding", "device", "timeout", "timeout_counts",
         "grace",
     ]  # fmt: skip
 

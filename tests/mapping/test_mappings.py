@@ -51,6 +51,7 @@ FINGERPRINTS = {
     "rtu-gripper.yaml": 0xFA2B68A8,
     "mqtt-cell.yaml": 0x78E08C30,
     "robot-program.yaml": 0xB17B003D,
+    "secured-cell.yaml": 0xEBFD327A,
     "small-cell.yaml": 0xBAD7CD02,
     "two-buses.yaml": 0x7F8C7A72,
     "two-plcs.yaml": 0x22928C89,
@@ -74,7 +75,7 @@ def test_listens_on_loopback_and_says_how_to_change_it(name: str) -> None:
     if modbus is not None:
         assert modbus.host == "127.0.0.1"
         assert modbus.port > 1023
-        assert "0.0.0.0:502" in text
+        assert ("0.0.0.0:502" if modbus.plain else "0.0.0.0:802") in text
 
 
 @pytest.mark.parametrize("name", ["canopen-only.yaml", "two-buses.yaml"])
@@ -94,6 +95,7 @@ def test_ready_made_files_are_there() -> None:
         "mqtt-cell.yaml",
         "rtu-gripper.yaml",
         "robot-program.yaml",
+        "secured-cell.yaml",
         "small-cell.yaml",
         "two-buses.yaml",
         "two-plcs.yaml",

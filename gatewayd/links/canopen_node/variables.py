@@ -39,6 +39,7 @@ ABORT_OF: Final = {
     Reason.WAITED: AbortCode.DEVICE_STATE,
     Reason.NOT_MEANT: AbortCode.LOCAL_CONTROL,
     Reason.CONTRADICTED: AbortCode.INVALID_VALUE,
+    Reason.NOT_IN_ROLE: AbortCode.READ_ONLY,
 }
 """The abort code for an SDO client whose request the cell refuses."""
 

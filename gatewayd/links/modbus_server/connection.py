@@ -10,14 +10,14 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Protocol, cast
+from typing import TYPE_CHECKING, Protocol, cast
 
 from gatewayd.core.requester import new_connection
 from gatewayd.links.contract import Passage, Tap
-from gatewayd.links.modbus_server.peers import Address, address_of
-from gatewayd.links.modbus_server.plan import Network
+from gatewayd.links.modbus_server.credentials import PeerCredentials
+from gatewayd.links.modbus_server.peers import Address, Place, address_of
 from gatewayd.links.modbus_server.polling import ReadPoller
 from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
 from gatewayd.links.modbus_server.sockets import has_unread, seconds_since_established, set_options
@@ -26,6 +26,9 @@ from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.modbus.frames import UNIT, whole_frames
 from gatewayd.report.format import address as address_text
+
+if TYPE_CHECKING:
+    from gatewayd.links.modbus_server.trust import Trust
 
 _log = logging.getLogger("gatewayd.modbus")
 
@@ -55,13 +58,19 @@ class PeerConnection(asyncio.BufferedProtocol):
         self.session = ModbusSession()
         self.receive: Callable[[int, float], bytes] = self.session.received
         """What takes the bytes that came in; another function while they may have waited, or while somebody traces."""
+        self.read: Callable[[int, Sequence[memoryview]], int] = os.readv
+        """What reads the socket; with TLS another function."""
         self._tap: Tap | None = None
         self.waiting: WaitedInput | None = None
         self.number = new_connection()
         self.peer = ""
         self.address: Address | None = None
         self.accesses: dict[int, UnitAccess] = {}
-        self.places: frozenset[Network] = frozenset()
+        self.credentials: PeerCredentials | None = None
+        """What it has shown of itself, with TLS."""
+        self.trust: Trust | None = None
+        """The files by which it was let in, with TLS."""
+        self.places: frozenset[Place] = frozenset()
         """Places of declared writers that it fills."""
         self.last_request = 0.0
         """When the last whole request came in; bytes that make none keep no connection open."""
@@ -87,11 +96,14 @@ class PeerConnection(asyncio.BufferedProtocol):
         set_options(sock)
         now = clock.now()
         self.last_request, self.established = now, now - seconds_since_established(sock)
-        self.admission.connected(self)
+        self._accepted()
         # asyncio begins to read after this call, in the same turn of the loop. Later versions skip that if reading is
         # paused by now; that of Python 3.11.2 (Debian 12) begins regardless. All of them obey a pause in the next turn,
         # and calls made here come before the sockets of that turn.
         asyncio.get_running_loop().call_soon(self._begin)
+
+    def _accepted(self) -> None:
+        self.admission.connected(self)
 
     def _begin(self) -> None:
         """Have the poller read in asyncio's place."""
@@ -100,10 +112,14 @@ class PeerConnection(asyncio.BufferedProtocol):
             self._watch()
 
     def _watch(self) -> None:
-        preferred, again = bool(self.places), self.session.pending
-        self.poller.add(self.descriptor, self.readable, preferred=preferred, again=again)
+        preferred = bool(self.places)
+        self.poller.add(self.descriptor, self.readable, preferred=preferred, again=self._has_more())
 
-    def fill(self, places: frozenset[Network]) -> None:
+    def _has_more(self) -> bool:
+        """Whether there is something to serve that the poller does not see."""
+        return self.session.pending
+
+    def fill(self, places: frozenset[Place]) -> None:
         """Fill these places of declared writers, whose requests come first."""
         self.places = places
         self.poller.prefer(self.descriptor, preferred=bool(places))
@@ -117,7 +133,7 @@ class PeerConnection(asyncio.BufferedProtocol):
         count = 0
         if not session.pending:
             try:
-                count = os.readv(self.descriptor, session.buffer.space)
+                count = self.read(self.descriptor, session.buffer.space)
             except OSError as error:
                 if not isinstance(error, (BlockingIOError, InterruptedError)):
                     self.abort(str(error))
@@ -168,9 +184,16 @@ class PeerConnection(asyncio.BufferedProtocol):
 
     def wait(self, since: float, until: float) -> None:
         """What is in the socket may have waited from `since` to `until`."""
-        unread = bool(self.session.buffer.end) or has_unread(self.descriptor)
-        self.waiting = WaitedInput(since, until, unread=unread, former=self.waiting)
+        self.waiting = WaitedInput(since, until, unread=self._unread(), former=self.waiting)
         self._receive_by(self._receive_late)
+
+    def _unread(self) -> bool:
+        """Whether anything of the peer's is waiting, in the socket or as a part of a request."""
+        return bool(self.session.buffer.end) or has_unread(self.descriptor)
+
+    def _is_empty(self, count: int, asked: int) -> bool:
+        """Whether nothing is waiting any more, after a read of so many bytes."""
+        return count < asked and not self.session.buffer.end
 
     def trace(self, tap: Tap | None) -> None:
         """Hand `tap` every frame from now on; None: no more."""
@@ -210,7 +233,7 @@ class PeerConnection(asyncio.BufferedProtocol):
             return session.received(count, now)
         asked = len(session.buffer.space[0])
         answers = session.received_late(count, now, waited)
-        if count < asked and not session.buffer.end:
+        if self._is_empty(count, asked):
             waiting.drained()
         return answers
 

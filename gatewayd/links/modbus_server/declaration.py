@@ -8,6 +8,7 @@ from gatewayd.core.definition import CellDefinition
 from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.core.status_layout import StatusField
 from gatewayd.links.contract import Description, LinkKind, LinkMetric
+from gatewayd.links.modbus_server.consent import weakened
 from gatewayd.links.modbus_server.description import description
 from gatewayd.links.modbus_server.plan import ModbusPlan, Network, network_text
 from gatewayd.mapping.plan import LinkPlan
@@ -28,6 +29,8 @@ class ModbusServer(LinkKind):
         "connections": "open connections of the listener",
         "refused": "connections that the listener refused since it was opened, by reason",
         "ignored": "registers and bits with nothing mapped that accepted writes covered (`write_gaps: ignore`)",
+        "tls": "the listener with TLS, null where there is none: `listen`, `listening`, `connections`, `refused` as "
+        "above, `handshakes` under way, `expires`: seconds since 1970 by file",
     }
     status_fields = (
         StatusField(26, 1, "modbus_connections", "open Modbus connections to this unit's listener"),
@@ -57,13 +60,39 @@ class ModbusServer(LinkKind):
             "ignored",
             "registers and bits with nothing mapped that accepted writes covered (write_gaps: ignore)",
         ),
+        LinkMetric(
+            "gatewayd_modbus_tls_up",
+            "tls_listening",
+            "1 while the Modbus listener with TLS accepts connections",
+            shared=("listener", "tls_listen"),
+        ),
+        LinkMetric(
+            "gatewayd_modbus_tls_connections",
+            "tls_connections",
+            "open Modbus connections with TLS",
+            shared=("listener", "tls_listen"),
+        ),
+        LinkMetric(
+            "gatewayd_modbus_tls_refused_connections_total",
+            "tls_refused",
+            "Modbus connections with TLS that were refused",
+            label="reason",
+            shared=("listener", "tls_listen"),
+        ),
+        LinkMetric(
+            "gatewayd_modbus_tls_expiry_timestamp_seconds",
+            "tls_expires",
+            "when the first thing in a file of a Modbus listener with TLS expires, in seconds since 1970",
+            label="file",
+            shared=("listener", "tls_listen"),
+        ),
     )
     place = "list of its places: `area`, `address` from 0, `bit` or null, `notation` (4xxxxx form)"
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
         """The unit and its map."""
         assert isinstance(plan, ModbusPlan)
-        return description(plan)
+        return description(plan, cell)
 
     def disturbs(
         self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
@@ -76,6 +105,8 @@ class ModbusServer(LinkKind):
                 network_text(network) for network in new.allow if not _is_within(network, old.allow)
             )
             yield Objection(ObjectionKind.WEAKENING, f"{more or 'everybody'} could connect to modbus too")
+        for text in weakened(old, new, before, after):
+            yield Objection(ObjectionKind.WEAKENING, text)
 
     def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
         """A unit always goes on; if it moves to another listener, its clients have to follow."""

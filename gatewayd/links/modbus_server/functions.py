@@ -9,17 +9,20 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Sequence
+from copy import copy
 
 from gatewayd.core import status_layout
-from gatewayd.core.admission import Change
+from gatewayd.core.admission import Change, value_for
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Value
 from gatewayd.core.freshness import Source
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
+from gatewayd.core.unserved import Unserved
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.registers import BitTable, RegisterImage, RegisterTable
+from gatewayd.links.modbus_server.rights import Rights
 from gatewayd.links.modbus_server.unserved import Places, named, unserved
 from gatewayd.links.modbus_server.usual import UsualWrites
 from gatewayd.links.registry import status_fields, status_tables
@@ -31,6 +34,7 @@ from gatewayd.modbus.areas import (
     MAX_WRITE_REGISTERS,
     MAX_WRITE_WITH_READ,
 )
+from gatewayd.modbus.describe import request_text
 from gatewayd.modbus.exceptions import ExceptionCode
 from gatewayd.modbus.identification import Identification
 
@@ -47,6 +51,7 @@ EXCEPTION_OF = {
     Reason.WAITED: ExceptionCode.BUSY,
     Reason.NOT_MEANT: ExceptionCode.BUSY,
     Reason.CONTRADICTED: ExceptionCode.ILLEGAL_VALUE,
+    Reason.NOT_IN_ROLE: ExceptionCode.ILLEGAL_FUNCTION,
 }
 
 
@@ -65,8 +70,27 @@ class Unit:
         self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
         self.exception_of = {**EXCEPTION_OF, Reason.ROBOT_LOST: plan.robot_away}
         goes_on = former is not None and former.cell.definition.name == cell.definition.name
-        self.ignored: int = former.ignored if former is not None and goes_on else 0
+        self._ignored = [former.ignored if former is not None and goes_on else 0]
+        """The one number that the unit and its limited forms count in."""
+        self.rights: Rights | None = None
+        """Of the role that it is limited to; None: it is not."""
+
+    @property
+    def ignored(self) -> int:
         """Registers and bits with nothing mapped that accepted writes covered."""
+        return self._ignored[0]
+
+    @ignored.setter
+    def ignored(self, count: int) -> None:
+        self._ignored[0] = count
+
+    def limited(self, rights: Rights) -> Unit:
+        """The same unit as a role with these rights has it: its own is only what is worked out ahead."""
+        unit = copy(self)
+        unit.rights = rights
+        unit.usual_registers = UsualWrites(self.cell, rights.usual(self.image.holding.usual))
+        unit.usual_coils = UsualWrites(self.cell, rights.usual(self.image.coils.usual))
+        return unit
 
     def close(self) -> None:
         """Follow the cell no longer."""
@@ -87,6 +111,9 @@ _READ_WRITE = struct.Struct(">HHHHB")
 
 def execute(unit: Unit, requester: Requester, pdu: bytes, now: float) -> bytes:
     """The answer to a request of `requester`."""
+    if unit.rights is not None and not unit.rights.serves(pdu):
+        unit.cell.unserved(requester, Unserved.NOT_IN_ROLE, request_text(pdu), now)
+        return exception(pdu[0], ExceptionCode.ILLEGAL_FUNCTION)
     serve, sizes = _FUNCTIONS.get(pdu[0], (None, ()))
     answer: Answer
     if serve is None:
@@ -241,7 +268,13 @@ def _apply_coils(
 def _write_status(
     unit: Unit, requester: Requester, address: int, words: Sequence[int], now: float
 ) -> ExceptionCode | None:
-    refusal = unit.status.write(requester, address - status_layout.BASE, words, now)
+    first = address - status_layout.BASE
+    refusal: Refusal | None
+    if unit.rights is not None and unit.rights.denies_status(first, words):
+        refusal = Refusal(Reason.NOT_IN_ROLE, request=f"wrote the status block at {address}")
+        unit.cell.refuse(requester, refusal, now)
+    else:
+        refusal = unit.status.write(requester, first, words, now)
     return unit.exception_of[refusal.reason] if refusal is not None else None
 
 
@@ -251,7 +284,11 @@ def _apply(
     """Hand all changes of one request to the cell at once, and every refusal of ours to its records."""
     refusal: Refusal | None
     value: Value | None = None
-    if isinstance(changes, Refusal):
+    denied = unit.rights.denied(changes, unit.cell.image.values) if unit.rights is not None else None
+    if denied is not None:
+        value = value_for(changes, denied.variable) if not isinstance(changes, Refusal) else None
+        refusal = denied
+    elif isinstance(changes, Refusal):
         refusal = named(changes, pdu, unit.places)
     elif requester.writer is None:
         # A peer that may write nothing is refused even if it wrote what is there already.

@@ -11,7 +11,9 @@ from gatewayd.links.modbus_places.types import PLACE_RULES, TYPE_SYNONYMS, reach
 from gatewayd.links.modbus_server.declaration import KIND
 from gatewayd.links.modbus_server.expand import ExpandedModbus, expand_modbus, placements_of
 from gatewayd.links.modbus_server.plan import ModbusPlan, Network, Placement, network_text
+from gatewayd.links.modbus_server.roles import role_writers, secured_plan
 from gatewayd.links.modbus_server.sections import Modbus, ModbusPlaces, ModbusWriter, PlacementSpec
+from gatewayd.links.modbus_server.tls_sections import RoleSpec, Tls
 from gatewayd.mapping.diagnostics import Related
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
@@ -34,19 +36,25 @@ class ModbusLanguage(LinkLanguage):
     commands = True
     variable_keys = ModbusPlaces
     writer_keys = ModbusWriter
+    writer_also_by = ("role",)
     rules = (
         *PLACE_RULES,
         *(
             f"gatewayd.links.modbus_server.rules.{name}"
-            for name in ("places", "listener", "peers", "sharing")
+            for name in ("places", "listener", "peers", "sharing", "roles", "certificates")
         ),
     )
     tables = "gatewayd.links.modbus_server.tables"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
-        (VariableSpec, "modbus"): PlacementSpec
+        (VariableSpec, "modbus"): PlacementSpec,
+        (Modbus, "tls"): Tls,
+        (Tls, "roles"): RoleSpec,
+        (Tls, "without_role"): RoleSpec,
     }
     articles: ClassVar[Mapping[type[Section], str]] = {
         Modbus: "the section `modbus`",
+        Tls: "the table `tls`",
+        RoleSpec: "a role",
         PlacementSpec: "a placement in `modbus`",
     }
     places = (PlacementSpec,)
@@ -64,12 +72,16 @@ class ModbusLanguage(LinkLanguage):
     place_example = "modbus: N"
 
     def knows(self, writer: WriterSpec) -> bool:
-        """Whether it has an address."""
-        return bool(writer.by(ModbusWriter).modbus)
+        """Whether it has an address, or a role."""
+        spec = writer.by(ModbusWriter)
+        return bool(spec.modbus) or spec.role is not None
 
     def names(self, writer: WriterSpec) -> Sequence[str]:
-        """Its addresses and networks."""
-        return [network_text(network) for network in writer.by(ModbusWriter).modbus]
+        """Its addresses and networks, and its role."""
+        spec = writer.by(ModbusWriter)
+        if spec.role is not None:
+            return [its.text for its in role_writers(spec, 0)]
+        return [network_text(network) for network in spec.modbus]
 
     def writes_whole(
         self, writer: WriterSpec, variables: Sequence[ExpandedVariable], cell: ExpandedCell
@@ -114,10 +126,12 @@ class ModbusLanguage(LinkLanguage):
             (network, index)
             for index, writer in enumerate(cell.document.writers.values())
             for network in writer.spec.by(ModbusWriter).modbus
+            if writer.spec.by(ModbusWriter).role is None
         ]
+        listen = next(iter(modbus.addresses.values()))
         return ModbusPlan(
-            host=modbus.listen.host,
-            port=modbus.listen.port,
+            host=listen.host,
+            port=listen.port,
             unit=modbus.unit,
             allow=modbus.allow,
             connections=modbus.connections,
@@ -134,6 +148,8 @@ class ModbusLanguage(LinkLanguage):
             writers=tuple(
                 sorted(peers, key=lambda peer: (_host_bits(peer[0]), peer[0].version, str(peer[0])))
             ),
+            tls=None if modbus.tls is None else secured_plan(modbus.tls, cell),
+            plain=("listen",) in modbus.addresses,
         )
 
 

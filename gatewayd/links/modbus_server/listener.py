@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.objection import Objection, ObjectionKind
@@ -20,23 +21,30 @@ from gatewayd.links.contract import Tap
 from gatewayd.links.modbus_server.connection import PeerConnection
 from gatewayd.links.modbus_server.default_unit import NamedPlan, default_cell, default_for, losing, lost
 from gatewayd.links.modbus_server.functions import Unit
+from gatewayd.links.modbus_server.handshakes import PATIENCE, Handshakes
 from gatewayd.links.modbus_server.limits import idle_timeout, overdue
 from gatewayd.links.modbus_server.peers import (
-    Address,
+    WITH_TLS,
     PeerEvent,
     PeerEventKind,
     PeerLog,
+    known_as,
     may_connect,
-    writer_of,
 )
-from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, RoleRights, TrustFiles
 from gatewayd.links.modbus_server.polling import ReadPoller
+from gatewayd.links.modbus_server.rights import Rights
 from gatewayd.links.modbus_server.session import UnitAccess
 from gatewayd.links.modbus_server.shares import Shares
 from gatewayd.links.modbus_server.waiting import SETTLING
 from gatewayd.links.modbus_server.writers import Accesses, names_of, succeeded, writers_of
 from gatewayd.loop import clock
 from gatewayd.report.format import address as address_text
+
+if TYPE_CHECKING:
+    # What TLS needs is imported where a listener has it.
+    from gatewayd.links.modbus_server.secure_connection import SecurePeerConnection
+    from gatewayd.links.modbus_server.trust import Trust
 
 _SWEEP = 0.25
 """Seconds between two looks for connections that are idle or stalled."""
@@ -68,8 +76,23 @@ class ModbusListener:
     """
 
     def __init__(
-        self, host: str, port: int, *, observe: Callable[[PeerEvent], None] = lambda _event: None
+        self,
+        host: str,
+        port: int,
+        *,
+        files: TrustFiles | None = None,
+        observe: Callable[[PeerEvent], None] = lambda _event: None,
     ) -> None:
+        """`files`: those of a secured listener (`renew` reads them); None: it has no TLS."""
+        self.files = files
+        self._trust: Trust | None = None
+        self.stamps: tuple[object, ...] = ()
+        """Of the files that were looked at last, good or bad."""
+        self.problem = ""
+        """Why other files than those in use cannot be used."""
+        self._handshakes = Handshakes()
+        self._limited: dict[tuple[int, RoleRights | None], Unit] = {}
+        """Units as roles have them, by number."""
         self._host = host
         self._port = port
         self._observe = observe
@@ -77,7 +100,11 @@ class ModbusListener:
         self._connections: dict[PeerConnection, None] = {}
         self._shares = Shares(())
         self._peer_log = PeerLog()
-        self.refusals = {kind.name.lower(): 0 for kind in PeerEventKind if kind.refused}
+        self.refusals = {
+            kind.name.lower(): 0
+            for kind in PeerEventKind
+            if kind.refused and (files is not None or kind not in WITH_TLS)
+        }
         """How many connections never began, by reason."""
         self._tap: Tap | None = None
         self._server: asyncio.Server | None = None
@@ -103,6 +130,11 @@ class ModbusListener:
         return self._units[unit].ignored if unit in self._units else 0
 
     @property
+    def handshakes(self) -> int:
+        """Handshakes that are under way."""
+        return len(self._handshakes)
+
+    @property
     def listening(self) -> bool:
         """Whether connections are accepted now."""
         return self._server is not None
@@ -117,10 +149,35 @@ class ModbusListener:
         """Host and port, for messages."""
         return address_text(self._host, self._port)
 
+    @property
+    def trust(self) -> Trust:
+        """By which files clients are let in now, and what they say; of a secured listener that listens."""
+        assert self._trust is not None
+        return self._trust
+
+    def renew(self, trust: Trust) -> None:
+        """Let clients in by these files from now on. Those that are there stay, unless something was withdrawn."""
+        from gatewayd.links.modbus_server.trust import ended_by  # noqa: PLC0415 - where a listener has TLS
+
+        self.files, self._trust, self.stamps, self.problem = trust.files, trust, trust.stamps, ""
+        for connection in list(self._connections):
+            if connection.credentials is None or connection.trust is None:
+                continue
+            reason = ended_by(connection.trust, trust, connection.credentials)
+            connection.trust = trust
+            if reason:
+                connection.abort(reason)
+                self.disconnected(connection, at_once=connection.credentials.serial in trust.facts.revoked)
+
     async def start(self) -> None:
-        """Listen. Raises ListenError."""
+        """Listen. Raises ListenError; of a secured listener `renew` was called before."""
         poller = ReadPoller()
-        accepted = partial(PeerConnection, self, poller)
+        if self.files is None:
+            accepted: Callable[[], PeerConnection] = partial(PeerConnection, self, poller)
+        else:
+            from gatewayd.links.modbus_server.secure_connection import SecurePeerConnection  # noqa: PLC0415
+
+            accepted = partial(SecurePeerConnection, self, poller)
         try:
             server = await asyncio.get_running_loop().create_server(
                 accepted, self._host, self._port, reuse_address=True, backlog=_ACCEPTED_AT_ONCE
@@ -148,6 +205,7 @@ class ModbusListener:
         for connection in list(self._connections):
             connection.abort(reason)
             self.disconnected(connection)
+        self._handshakes.close()
         self._report_kept_back(math.inf)
         for unit in self._units.values():
             unit.close()
@@ -190,7 +248,8 @@ class ModbusListener:
                 kept = Unit(plan, cell, kept)
             units_now[number] = kept
         self._units = units_now
-        self._shares = Shares(self._plans())
+        self._limited = {}
+        self._shares = Shares(self._plans(), secured=self.files is not None)
         now = clock.now()
         for connection in list(self._connections):
             if not self._admit(connection, now, "unit no longer served", successors):
@@ -238,22 +297,51 @@ class ModbusListener:
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`: what is in the sockets may have waited that long."""
         self._gap = since, now
+        self._handshakes.stood_still(now - since)
         for connection in self._connections:
             connection.stood_still(since, now)
 
     # -- called by connections ------------------------------------------------------------------------------------
 
-    def connected(self, connection: PeerConnection) -> None:
-        """A peer has connected: let it in or refuse it."""
+    def arrived(self, connection: SecurePeerConnection) -> None:
+        """A peer has connected to a secured listener: have its handshake, or refuse it."""
+        now = clock.now()
+        if not self._reaches(connection, now):
+            return
+        former = self._handshakes.begin(connection, now)
+        if former is not None:
+            former.fail(PeerEventKind.UNFINISHED, "made room for another handshake")
+
+    def ready(self, connection: SecurePeerConnection) -> None:
+        """Its handshake can go on."""
+        self._handshakes.ready(connection)
+
+    def refused(self, connection: SecurePeerConnection, kind: PeerEventKind, reason: str) -> None:
+        """A handshake has failed, or took too long."""
+        if self._handshakes.end(connection):
+            self.refusals[kind.name.lower()] += 1
+            self._report(kind, connection, clock.now(), reason)
+
+    def _reaches(self, connection: PeerConnection, now: float) -> bool:
+        """Whether the peer may reach any unit; refused if not."""
         if self._server is None:
             connection.abort("not listening")
-            return
-        now = clock.now()
+            return False
         address = connection.address
         if address is None or not any(may_connect(address, unit.plan) for unit in self._units.values()):
             self._refuse(connection, PeerEventKind.DENIED, now)
+            return False
+        return True
+
+    def connected(self, connection: PeerConnection) -> None:
+        """A peer has connected, and has shown who it is where that is asked for: let it in or refuse it."""
+        now = clock.now()
+        self._handshakes.end(connection)
+        if not self._reaches(connection, now) or not self._still_trusts(connection, now):
             return
-        connection.places = self._shares.places_of(address)
+        address = connection.address
+        assert address is not None
+        connection.places = self._shares.places_of(address, connection.credentials)
         room = self._shares.room_for(connection, self._connections, now)
         if isinstance(room, PeerEventKind):
             self._refuse(connection, room, now)
@@ -270,8 +358,22 @@ class ModbusListener:
         self._count()
         self._report(PeerEventKind.CONNECTED, connection, now)
 
-    def disconnected(self, connection: PeerConnection) -> None:
-        """A connection has ended; called once or more for each."""
+    def _still_trusts(self, connection: PeerConnection, now: float) -> bool:
+        """Whether the files by which its handshake began would let it in now; refused if not."""
+        if connection.credentials is None or connection.trust is None:
+            return True
+        from gatewayd.links.modbus_server.trust import ended_by  # noqa: PLC0415 - where a listener has TLS
+
+        reason = ended_by(connection.trust, self.trust, connection.credentials)
+        connection.trust = self.trust
+        if reason:
+            self._refuse(connection, PeerEventKind.UNVERIFIED, now, reason)
+        return not reason
+
+    def disconnected(self, connection: PeerConnection, *, at_once: bool = False) -> None:
+        """A connection has ended; called once or more for each. `at_once`: nothing it owns outlives it."""
+        if self._handshakes.end(connection):
+            self._refuse(connection, PeerEventKind.UNSECURED, clock.now(), connection.reason)
         if connection not in self._connections:
             return
         del self._connections[connection]
@@ -279,7 +381,7 @@ class ModbusListener:
         accesses, connection.accesses = connection.accesses, {}
         connection.session.serve({})
         for cell, requester in writers_of(accesses):
-            cell.writer_disconnected(requester, now, connection.reason)
+            cell.writer_disconnected(requester, now, connection.reason, at_once=at_once)
         self._count()
         self._report(PeerEventKind.DISCONNECTED, connection, now, connection.reason)
 
@@ -297,8 +399,10 @@ class ModbusListener:
         Writers that it is both before and after stay connected throughout.
         """
         address = connection.address
-        accesses = {} if address is None else self._accesses(address, connection.number)
-        connection.fill(frozenset() if address is None else self._shares.places_of(address))
+        accesses = self._accesses(connection)
+        connection.fill(
+            frozenset() if address is None else self._shares.places_of(address, connection.credentials)
+        )
         before, after = succeeded(writers_of(connection.accesses), successors), writers_of(accesses)
         left = self._left(connection.accesses, accesses, successors)
         connection.accesses = accesses
@@ -323,26 +427,48 @@ class ModbusListener:
         cell = None if former is None else successors.get(former, former)
         return None if cell is default_cell(after) else cell
 
-    def _accesses(self, address: Address, connection: int) -> dict[int, UnitAccess]:
+    def _accesses(self, connection: PeerConnection) -> dict[int, UnitAccess]:
         """What a peer may do, by unit."""
-        return {
-            number: UnitAccess(
-                unit, Requester(writer_of(address, unit.plan.writers), str(address), connection)
-            )
-            for number, unit in self._units.items()
-            if may_connect(address, unit.plan)
-        }
+        address, shown = connection.address, connection.credentials
+        if address is None:
+            return {}
+        peer = str(address) if shown is None else f"{address} ({shown.text})"
+        found = {}
+        for number, unit in self._units.items():
+            if may_connect(address, unit.plan):
+                known = known_as(address, shown, unit.plan)
+                requester = Requester(None if known is None else known[1], peer, connection.number)
+                found[number] = UnitAccess(
+                    unit if shown is None else self._limited_to(number, unit, shown.role), requester
+                )
+        return found
 
-    def _refuse(self, connection: PeerConnection, kind: PeerEventKind, now: float) -> None:
-        connection.abort(kind.value)
+    def _limited_to(self, number: int, unit: Unit, role: str | None) -> Unit:
+        """The unit as a role has it."""
+        assert unit.plan.tls is not None
+        granted = unit.plan.tls.rights_of(role)
+        key = number, granted if granted in unit.plan.tls.roles else None
+        if key not in self._limited:
+            rights = Rights(unit.plan, granted)
+            self._limited[key] = unit.limited(rights) if rights.limited else unit
+        return self._limited[key]
+
+    def _refuse(self, connection: PeerConnection, kind: PeerEventKind, now: float, reason: str = "") -> None:
+        connection.abort(reason or kind.value)
         self.refusals[kind.name.lower()] += 1
-        self._report(kind, connection, now, kind.value)
+        self._report(kind, connection, now, reason or kind.value)
 
     def _report(self, kind: PeerEventKind, connection: PeerConnection, now: float, reason: str = "") -> None:
         address = connection.address
         if self._peer_log.reports(str(address), kind, now):
-            writers = () if address is None else names_of(self._accesses(address, connection.number))
-            self._observe(PeerEvent(kind, connection.peer, writers, reason))
+            writers = names_of(self._accesses(connection)) if self._is_known(connection) else ()
+            self._observe(
+                PeerEvent(kind, connection.peer, writers, reason, credentials=connection.credentials)
+            )
+
+    def _is_known(self, connection: PeerConnection) -> bool:
+        """Whether it is known which writer the peer is: with TLS not before the handshake."""
+        return self.files is None or connection.credentials is not None
 
     def _report_kept_back(self, now: float) -> None:
         for event in self._peer_log.kept_back(now):
@@ -355,6 +481,8 @@ class ModbusListener:
         self.progress += 1
         now = clock.now()
         self._report_kept_back(now)
+        for handshake in self._handshakes.overdue(now):
+            handshake.fail(PeerEventKind.UNFINISHED, f"not finished within {PATIENCE:g} s")
         idle = idle_timeout(self._plans())
         for connection in list(self._connections):
             reason = overdue(connection, idle, now)

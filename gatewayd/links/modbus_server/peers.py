@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from ipaddress import IPv4Address, IPv6Address, ip_address
 
-from gatewayd.links.modbus_server.plan import ModbusPlan, Network
+from gatewayd.links.modbus_server.credentials import PeerCredentials
+from gatewayd.links.modbus_server.plan import ModbusPlan, Network, RoleWriter
 
 Address = IPv4Address | IPv6Address
+Place = Network | RoleWriter
+"""By what a writer is known: an address, or the role of a certificate."""
 OTHER_PEERS = "other addresses"
 
 
@@ -21,6 +24,9 @@ class PeerEventKind(Enum):
     DENIED = "not on the access list"
     FULL = "no free connection"
     CROWDED = "too many connections of one peer"
+    UNVERIFIED = "certificate not accepted"
+    UNSECURED = "TLS handshake failed"
+    UNFINISHED = "TLS handshake not finished in time"
 
     @property
     def refused(self) -> bool:
@@ -28,7 +34,9 @@ class PeerEventKind(Enum):
         return self in _REFUSED
 
 
-_REFUSED = frozenset({PeerEventKind.DENIED, PeerEventKind.FULL, PeerEventKind.CROWDED})
+_REFUSED = frozenset(PeerEventKind) - {PeerEventKind.CONNECTED, PeerEventKind.DISCONNECTED}
+WITH_TLS = frozenset({PeerEventKind.UNVERIFIED, PeerEventKind.UNSECURED, PeerEventKind.UNFINISHED})
+"""What happens on a listener with TLS alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +52,8 @@ class PeerEvent:
     """Why the connection ended, or could not begin."""
     repeats: int = 0
     """It stands for so many events of the address that were not reported by themselves; 0: for one."""
+    credentials: PeerCredentials | None = None
+    """What it has shown of itself; None: it connected without TLS, or was refused before."""
 
 
 def address_of(host: str) -> Address:
@@ -57,14 +67,21 @@ def may_connect(address: Address, plan: ModbusPlan) -> bool:
     return not plan.allow or any(_within(address, network) for network in plan.allow)
 
 
-def writer_of(address: Address, writers: Sequence[tuple[Network, int]]) -> int | None:
-    """The writer the peer is; `writers` has the most specific network first."""
-    return next((writer for network, writer in writers if _within(address, network)), None)
+def known_as(
+    address: Address, credentials: PeerCredentials | None, plan: ModbusPlan
+) -> tuple[Place, int] | None:
+    """The writer the peer is, and by what; None: it is none.
 
-
-def network_of(address: Address, writers: Sequence[tuple[Network, int]]) -> Network | None:
-    """The network by which it is that writer."""
-    return next((network for network, _writer in writers if _within(address, network)), None)
+    A writer with a role is none without a certificate that has it. Who has shown a certificate may be one by the
+    address alone, if it is none by its role; and nobody is one whose role may write nothing.
+    """
+    if credentials is not None and plan.tls is not None:
+        if not plan.tls.rights_of(credentials.role).writes:
+            return None
+        for its in plan.tls.writers:
+            if its.role == credentials.role and (its.network is None or _within(address, its.network)):
+                return its, its.writer
+    return next(((network, writer) for network, writer in plan.writers if _within(address, network)), None)
 
 
 def _within(address: Address, network: Network) -> bool:

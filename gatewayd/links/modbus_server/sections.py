@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from gatewayd.links.modbus_places.sections import AREA_KEYS, RegisterSpec, WordOrder
+from gatewayd.links.modbus_server.tls_sections import RoleName, Tls
 from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import Listen, ListenAddress, Networks, OptionalDuration, Whole, refuse
 from gatewayd.mapping.section import Section
@@ -19,7 +20,7 @@ class Modbus(Section):
 
     listen: Listen = Field(
         default=ListenAddress("127.0.0.1", 502),
-        description="address and port to listen on",
+        description="address and port to listen on; with `tls` and without this key: none without TLS",
         json_schema_extra={"default": "127.0.0.1:502"},
     )
     unit: Whole = Field(default=1, ge=1, le=247, description="unit identifier of this cell")
@@ -59,6 +60,14 @@ class Modbus(Section):
         description="order of values of two or more registers that do not name their own; values of one register "
         "(16 bits, `bool`, bits) stay as they are",
     )
+    tls: Tls | None = Field(default=None, description="a listener with TLS, beside the other or in its place")
+
+    @property
+    def addresses(self) -> Mapping[tuple[str, ...], ListenAddress]:
+        """Path of the key -> where it is listened, the one without TLS first."""
+        plain = self.tls is None or "listen" in self.model_fields_set
+        found: dict[tuple[str, ...], ListenAddress] = {("listen",): self.listen} if plain else {}
+        return found if self.tls is None else {**found, ("tls", "listen"): self.tls.listen}
 
 
 class PlacementSpec(RegisterSpec):
@@ -105,4 +114,9 @@ class ModbusWriter(Section):
 
     modbus: Networks = Field(
         default=(), description="address or network of the Modbus client, or a list of them"
+    )
+    role: RoleName | None = Field(
+        default=None,
+        description="role of its certificate: it is known by that, on the listener with TLS alone; with `modbus` it "
+        "has to connect from there as well",
     )

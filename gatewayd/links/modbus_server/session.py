@@ -76,6 +76,9 @@ class ModbusSession:
             self._accesses.update(dict.fromkeys(_THIS_DEVICE, accesses[default]))
         self._reads = {}
         for unit, access in self._accesses.items():
+            rights = access.unit.rights
+            if rights is not None and not rights.reads_all:
+                continue
             image = access.unit.image
             for function, table in ((_READ_HOLDING, image.holding), (_READ_INPUT, image.input)):
                 key = unit << 8 | function

@@ -14,8 +14,9 @@ from collections import Counter
 from collections.abc import Collection, Iterable
 from typing import Protocol, TypeVar
 
-from gatewayd.links.modbus_server.peers import Address, PeerEventKind, may_connect, network_of
-from gatewayd.links.modbus_server.plan import ModbusPlan, Network
+from gatewayd.links.modbus_server.credentials import PeerCredentials
+from gatewayd.links.modbus_server.peers import Address, PeerEventKind, Place, known_as, may_connect
+from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.writers import Accesses, hold_anything
 
 UNUSED_AFTER = 10.0
@@ -28,7 +29,7 @@ class _Connection(Protocol):
     @property
     def address(self) -> Address | None: ...
     @property
-    def places(self) -> frozenset[Network]: ...
+    def places(self) -> frozenset[Place]: ...
     @property
     def last_request(self) -> float: ...
     @property
@@ -41,16 +42,19 @@ _Present = TypeVar("_Present", bound=_Connection)
 class Shares:
     """The connections of one listener. Of several units' limits the most generous count."""
 
-    def __init__(self, plans: Collection[ModbusPlan]) -> None:
+    def __init__(self, plans: Collection[ModbusPlan], *, secured: bool = False) -> None:
+        """`secured`: of a listener with TLS, where places are kept for the writers that are known by a role."""
         self._plans = tuple(plans)
         self._connections = max((plan.connections for plan in plans), default=0)
         self._per_peer = max((plan.max_per_peer for plan in plans), default=0)
-        self._places = frozenset(network for plan in plans for network, _writer in plan.writers)
+        self._places: frozenset[Place] = frozenset(
+            place for plan in plans for place in (_of_roles(plan) if secured else _of_addresses(plan))
+        )
 
-    def places_of(self, address: Address) -> frozenset[Network]:
+    def places_of(self, address: Address, credentials: PeerCredentials | None = None) -> frozenset[Place]:
         """The places that a peer fills: of each unit's writers the one that it is. Empty: no writer is declared."""
-        found = (network_of(address, plan.writers) for plan in self._plans if may_connect(address, plan))
-        return frozenset(network for network in found if network is not None)
+        found = (known_as(address, credentials, plan) for plan in self._plans if may_connect(address, plan))
+        return frozenset(known[0] for known in found if known is not None)
 
     def room_for(
         self, newcomer: _Connection, present: Collection[_Present], now: float
@@ -95,6 +99,14 @@ class Shares:
         if vacant & newcomer.places:
             return len(present)
         return len(present) + min(len(vacant), self._connections - 1)
+
+
+def _of_addresses(plan: ModbusPlan) -> Iterable[Place]:
+    return (network for network, _writer in plan.writers)
+
+
+def _of_roles(plan: ModbusPlan) -> Iterable[Place]:
+    return plan.tls.writers if plan.tls is not None else ()
 
 
 def _free_to_end(connections: Iterable[_Present]) -> list[_Present]:

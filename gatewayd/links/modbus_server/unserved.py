@@ -87,6 +87,10 @@ def unserved(
 ) -> tuple[Unserved, str] | None:
     """Why a request was answered with exception `code`, in words; None if the cell has recorded it as refused."""
     if code == _ILLEGAL_FUNCTION:
+        if (
+            writing(pdu) is not None
+        ):  # every function that writes is served: the peer's role has no right to it
+            return None
         return Unserved.NO_SUCH_FUNCTION, f"asked for {function_text(pdu)}, which is not served"
     wrong, span = fault(pdu), reading(pdu)
     if wrong:

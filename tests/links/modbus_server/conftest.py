@@ -7,6 +7,7 @@ import struct
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from ipaddress import ip_network
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -29,6 +30,9 @@ from gatewayd.links.modbus_server.peers import PeerEvent
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import make_codec
+
+if TYPE_CHECKING:
+    from tests.links.modbus_server.secured import Certificates
 
 PLC, HMI = 0, 1
 NOW = 1000.0
@@ -285,3 +289,11 @@ async def ask(listener: ModbusListener) -> AsyncIterator[Ask]:
     yield ask
     for _reader, writer in streams.values():
         writer.close()
+
+
+@pytest.fixture(scope="session")
+def certificates(tmp_path_factory: pytest.TempPathFactory) -> Certificates:
+    """Of a listener with TLS and its clients, made by the program openssl."""
+    from tests.links.modbus_server.secured import make_certificates
+
+    return make_certificates(tmp_path_factory.mktemp("certificates"))

@@ -41,6 +41,7 @@ def test_every_reason_has_its_exception() -> None:
         "PARTIAL_TAKEOVER": 0x03,
         "WAITED": 0x06,
         "NOT_MEANT": 0x06,
+        "NOT_IN_ROLE": 0x01,
         "CONTRADICTED": 0x03,
     }
 

@@ -40,23 +40,28 @@ def test_without_a_listener_nobody_reaches_it_and_it_says_so() -> None:
         "refused": {},
         "ignored": 0,
         "listening": False,
+        "tls": None,
+        "tls_listen": "",
     }
 
 
 async def test_with_a_listener_that_listens_it_is_reachable() -> None:
     plan = compiled()
     unit = ModbusUnit(plan.the(ModbusPlan), Cell(plan.cell))
-    unit.listener = ModbusListener("127.0.0.1", 0)
-    await unit.listener.start()
+    listener = ModbusListener("127.0.0.1", 1502)
+    listener._port = 0
+    await listener.start()
+    listener._port = 1502
+    unit.listeners.append(listener)
     try:
         assert unit.reachable
         assert (unit.health().level, unit.health().words) == (Level.GOOD, "listening, no connections")
         assert unit.health().figures["refused"] == {"denied": 0, "full": 0, "crowded": 0}
-        unit.listener.serve([(unit.plan, unit.cell)])
-        unit.listener._units[3].ignored = 7
+        listener.serve([(unit.plan, unit.cell)])
+        listener._units[3].ignored = 7
         assert unit.health().figures["ignored"] == 7
     finally:
-        await unit.listener.close()
+        await listener.close()
 
 
 def test_it_is_the_unit_of_another_plan_and_cell_after_a_reload() -> None:

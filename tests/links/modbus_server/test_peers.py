@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from ipaddress import ip_address, ip_network
 
 import pytest
@@ -12,9 +13,8 @@ from gatewayd.links.modbus_server.peers import (
     PeerEventKind,
     PeerLog,
     address_of,
+    known_as,
     may_connect,
-    network_of,
-    writer_of,
 )
 from gatewayd.links.modbus_server.plan import ModbusPlan
 
@@ -34,15 +34,14 @@ def test_address_of_a_peer(host: str, address: str) -> None:
     assert address_of(host) == ip_address(address)
 
 
-def test_the_first_network_that_has_the_peer_names_the_writer() -> None:
+def test_the_first_network_that_has_the_peer_names_the_writer(plan_of: Callable[..., ModbusPlan]) -> None:
     """The plan has the most specific one first."""
     writers = ((ip_network("192.0.2.7/32"), 3), (ip_network("fd00::/8"), 4), (ip_network("192.0.2.0/24"), 5))
-    assert writer_of(ip_address("192.0.2.7"), writers) == 3
-    assert writer_of(ip_address("192.0.2.8"), writers) == 5
-    assert writer_of(ip_address("fd00::1"), writers) == 4
-    assert writer_of(ip_address("198.51.100.7"), writers) is None
-    assert network_of(ip_address("192.0.2.8"), writers) == ip_network("192.0.2.0/24")
-    assert network_of(ip_address("198.51.100.7"), writers) is None
+    plan = replace(plan_of(), writers=writers)
+    assert known_as(ip_address("192.0.2.7"), None, plan) == (writers[0][0], 3)
+    assert known_as(ip_address("192.0.2.8"), None, plan) == (writers[2][0], 5)
+    assert known_as(ip_address("fd00::1"), None, plan) == (writers[1][0], 4)
+    assert known_as(ip_address("198.51.100.7"), None, plan) is None
 
 
 def test_without_an_access_list_everybody_may_connect(plan_of: Callable[..., ModbusPlan]) -> None:

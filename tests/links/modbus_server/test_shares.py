@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import Unit
-from gatewayd.links.modbus_server.peers import Address, PeerEventKind
-from gatewayd.links.modbus_server.plan import ModbusPlan, Network
+from gatewayd.links.modbus_server.peers import Address, PeerEventKind, Place
+from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.session import UnitAccess
 from gatewayd.links.modbus_server.shares import UNUSED_AFTER, Shares
 from gatewayd.links.modbus_server.writers import Accesses
@@ -29,7 +29,7 @@ class Peer:
     """As much of a connection as shares look at; by default one in use."""
 
     address: Address
-    places: frozenset[Network]
+    places: frozenset[Place]
     last_request: float = NOW
     accesses: Accesses = field(default_factory=dict)
 

@@ -56,5 +56,7 @@ def overlapping_peers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 def _peers(document: Document) -> Iterator[tuple[Part[WriterSpec], Network, Position]]:
     for writer in document.writers.values():
+        if writer.spec.by(ModbusWriter).role is not None:
+            continue  # known by that: GW237
         for index, network in enumerate(writer.spec.by(ModbusWriter).modbus):
             yield writer, network, writer.at("modbus", index)

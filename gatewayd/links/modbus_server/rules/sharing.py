@@ -76,7 +76,8 @@ def _is_shared(cell: ExpandedCell, bit: _Bit) -> bool:
     """Whether several writers may own it, one of them by Modbus."""
     owners = cell.locks[bit.lock].owners
     return len(owners) > 1 and any(
-        cell.document.writers[name].spec.by(ModbusWriter).modbus for name in owners
+        (spec := cell.document.writers[name].spec.by(ModbusWriter)).modbus or spec.role is not None
+        for name in owners
     )
 
 

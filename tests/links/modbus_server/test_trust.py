@@ -1,0 +1,140 @@
+"""Files of a listener with TLS: read, refused with the reason, and compared."""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from gatewayd.links.modbus_server.credentials import PeerCredentials
+from gatewayd.links.modbus_server.plan import TrustFiles
+from gatewayd.links.modbus_server.trust import FileFacts, Trust, TrustError, ended_by, load, look, stamps_of
+from gatewayd.machine.revocation import RevocationList
+from gatewayd.machine.x509 import Certificate
+from tests.links.modbus_server.secured import Certificates
+from tests.peers.authority import OPENSSL, run
+
+pytestmark = pytest.mark.skipif(OPENSSL is None, reason="no program openssl")
+
+
+def test_files_that_fit(certificates: Certificates) -> None:
+    trust = load(certificates.files())
+    assert trust.facts.is_whole_chain
+    assert [one.subject for one in trust.facts.chain] == ["CN=gateway", "CN=Commissioning"]
+    assert trust.facts.expiries.keys() == {"certificate", "clients", "revoked"}
+    assert not trust.facts.exposed
+    assert load(certificates.files(revoked=False)).facts.expiries.keys() == {"certificate", "clients"}
+
+
+def _other_key(files: TrustFiles, certificates: Certificates, _folder: Path) -> TrustFiles:
+    return replace(files, key=str(certificates.viewer.key))
+
+
+def _no_key(files: TrustFiles, _certificates: Certificates, folder: Path) -> TrustFiles:
+    return replace(files, key=str(folder / "nowhere.key"))
+
+
+def _encrypted(files: TrustFiles, certificates: Certificates, folder: Path) -> TrustFiles:
+    path = folder / "encrypted.key"
+    run("pkey", "-in", certificates.gateway.key, "-aes256", "-passout", "pass:secret", "-out", path)
+    return replace(files, key=str(path))
+
+
+def _no_list(files: TrustFiles, _certificates: Certificates, _folder: Path) -> TrustFiles:
+    return replace(files, revoked=files.clients)
+
+
+def _no_certificate(files: TrustFiles, _certificates: Certificates, _folder: Path) -> TrustFiles:
+    return replace(files, certificate=files.key)
+
+
+def _a_folder(files: TrustFiles, _certificates: Certificates, folder: Path) -> TrustFiles:
+    return replace(files, clients=str(folder))
+
+
+def _broken(files: TrustFiles, _certificates: Certificates, folder: Path) -> TrustFiles:
+    path = folder / "broken.crt"
+    path.write_text("-----BEGIN CERTIFICATE-----\nAAEC\n-----END CERTIFICATE-----\n")
+    return replace(files, clients=str(path))
+
+
+@pytest.mark.parametrize(
+    "change,reason",
+    [
+        (_other_key, r"key: \S+viewer.key does not fit the certificate \S+gateway.crt"),
+        (_no_key, "key: .*nowhere.key cannot be read: no such file"),
+        (_encrypted, "key: .* is encrypted, and nobody is there to give its password; store it without one"),
+        (_no_list, "revoked: .* cannot be used: no PEM revocation list"),
+        (_no_certificate, "certificate: .* cannot be used: no PEM certificate"),
+        (_a_folder, "clients: .* cannot be read: is a directory"),
+        (_broken, "clients: .* cannot be used: not an X.509 certificate"),
+    ],
+)
+def test_what_is_wrong_is_said_with_the_file(
+    certificates: Certificates,
+    tmp_path: Path,
+    change: Callable[[TrustFiles, Certificates, Path], TrustFiles],
+    reason: str,
+) -> None:
+    with pytest.raises(TrustError, match=reason):
+        load(change(certificates.files(), certificates, tmp_path))
+
+
+def test_a_chain_that_ends_before_the_authority(certificates: Certificates) -> None:
+    alone = certificates.gateway.certificate.with_suffix(".pem")
+    assert not look(replace(certificates.files(), certificate=str(alone))).is_whole_chain
+
+
+def test_a_key_that_everybody_can_read(certificates: Certificates, tmp_path: Path) -> None:
+    copy = tmp_path / "cell.key"
+    copy.write_bytes(certificates.gateway.key.read_bytes())
+    for mode, exposed in ((0o640, False), (0o644, True), (0o600, False)):
+        copy.chmod(mode)
+        assert look(replace(certificates.files(), key=str(copy))).exposed is exposed
+
+
+def test_a_file_that_is_another_one_has_another_stamp(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    files = TrustFiles(str(file), str(file), str(file), None)
+    assert stamps_of(files) == (None, None, None)
+    file.write_text("a")
+    first = stamps_of(files)
+    new = tmp_path / "new"
+    new.write_text("b")
+    new.replace(file)
+    assert stamps_of(files) != first
+
+
+AUTHORITY = Certificate("CN=root", b"root", b"root", 0.0, 1.0)
+
+
+def trust_with(authorities: set[bytes], *serials: int) -> Trust:
+    lists = (RevocationList(b"root", None, frozenset(serials)),)
+    facts = FileFacts((), (AUTHORITY,), lists)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    return Trust(TrustFiles("", "", "", None), facts, (), context, frozenset(authorities))
+
+
+@pytest.mark.parametrize(
+    "before,after,issuer,reason",
+    [
+        (trust_with({b"a"}), trust_with({b"a", b"b"}), b"root", ""),
+        (trust_with({b"a"}), trust_with({b"a"}, 7), b"root", "its certificate was revoked"),
+        (trust_with({b"a"}), trust_with({b"a"}, 8), b"root", ""),
+        (
+            trust_with({b"a"}),
+            trust_with({b"a"}, 8),
+            b"between",
+            "a certificate was revoked that may be in its chain",
+        ),
+        (trust_with({b"a"}, 8), trust_with({b"a"}, 8), b"between", ""),
+        (trust_with({b"a", b"b"}), trust_with({b"b"}), b"root", "an authority of clients was withdrawn"),
+    ],
+)
+def test_who_has_to_show_its_certificate_anew(
+    before: Trust, after: Trust, issuer: bytes, reason: str
+) -> None:
+    assert ended_by(before, after, PeerCredentials("operator", "plc", 7, issuer, 0.0)) == reason
