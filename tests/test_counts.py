@@ -60,6 +60,8 @@ NEVER_ONE = {
     "mqtt.names: len(topic)": "none, or longer than any topic may be",
     "mqtt.packets: length": "more than is read",
     "mqtt.words: len(data)": "more than is shown",
+    "sparkplug.payload: len(data)": "more than the limit",
+    "sparkplug.primary_host: len(data)": "more than the limit",
     "mapping.rules.bounds: len(cell.variables)": "more than the limit",
     "mapping.rules.bounds: len(writers)": "more than the limit",
     "mapping.scalars: len(text)": "longer than any name may be",

@@ -216,7 +216,9 @@ def _decode_properties(data: bytes, depth: int) -> PropertySet:
         else:
             values.append(_decode_property(content, depth))
     if len(keys) != len(values):
-        raise PayloadError(f"has a property set with {len(keys)} keys and {len(values)} values")
+        raise PayloadError(
+            f"has a property set with keys and values in unequal numbers: {len(keys)} and {len(values)}"
+        )
     return tuple(zip(keys, values, strict=True))
 
 

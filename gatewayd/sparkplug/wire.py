@@ -60,7 +60,7 @@ def _read_content(data: bytes, position: int, wire_type: int) -> tuple[Content, 
         raise PayloadError(f"has wire type {wire_type} where a field begins")
     after = position + size
     if after > len(data):
-        raise PayloadError(f"ends {after - len(data)} bytes too early")
+        raise PayloadError(f"ends too early; missing bytes: {after - len(data)}")
     return data[position:after], after
 
 

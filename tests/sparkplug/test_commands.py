@@ -101,7 +101,7 @@ def test_a_command_that_names_nothing_is_refused() -> None:
 
 def test_bytes_that_are_no_payload_are_refused() -> None:
     outcome = read_command(DEVICE, b'{"part": 1}').outcome
-    assert outcome == CommandRefused("d", (), "the payload ends 104 bytes too early")
+    assert outcome == CommandRefused("d", (), "the payload ends too early; missing bytes: 104")
 
 
 REBIRTH = {"name": "Node Control/Rebirth", "boolean_value": True}

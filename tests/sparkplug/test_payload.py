@@ -232,7 +232,7 @@ def _read_as_they_do(data: bytes) -> bool:
         (bytes(65_537), "65537 bytes; at most 65536"),
         (bytes_field(2, b"") * 2049, "over 2048 metrics"),
         (bytes_field(2, text_field(1, "a")[:-1] + b"\xff"), "not UTF-8"),
-        (bytes_field(2, bytes_field(9, text_field(1, "a"))), "1 keys and 0 values"),
+        (bytes_field(2, bytes_field(9, text_field(1, "a"))), "unequal numbers: 1 and 0"),
         (bytes_field(2, b"\x0a\x05a"), "too early"),
     ],
 )
