@@ -172,7 +172,7 @@ class Nodes:
                 if number % 10 == 0:
                     await asyncio.sleep(0)
 
-    def _state(self) -> dict[str, float]:
+    def _state(self) -> dict[str, object]:
         nodes = self._nodes
         return {
             "connected": sum(node.session.client.is_connected for node in nodes),
@@ -186,7 +186,7 @@ class Nodes:
 
 async def _main(host: str, port: int, count: int, metrics: int, period: float) -> None:
     if count > FEW:
-        link_session.TICK = mqtt_client.STEP = PAUSE  # type: ignore[misc, attr-defined]
+        link_session.TICK = mqtt_client.STEP = PAUSE  # type: ignore[attr-defined]
     nodes = [Node(number, host, port, metrics) for number in range(count)]
     gc.freeze()
     running = Nodes(nodes, period)
