@@ -133,6 +133,7 @@ LAYERS: dict[str, set[str]] = {
         "report.wording",
     },
     "links.mqtt": {*LINK, "links.mqtt", "mqtt", "sparkplug"},
+    "links.standby": {*LINK, "links.standby"},
     "report": {"core", "links.contract", "links.registry", "mapping", "report"},
     "maptest": {
         "core",
@@ -184,6 +185,7 @@ LAYERS: dict[str, set[str]] = {
         "control",
         "core",
         "gatewayd",
+        "links.access",
         "links.contract",
         "links.registry",
         "logs",
@@ -354,6 +356,7 @@ IMPURE = {
     "links.modbus_server.secure_connection": "compares the date of a certificate",
     "links.modbus_server.sockets": "has the sockets",
     "links.modbus_server.trust_findings": "writes dates",
+    "links.standby.link": "a link at work",
     "links.robot.dashboard.doctor": "asks the robot",
     "links.robot.dashboard.link": "a link at work",
     "links.robot.doctor": "asks the name service and the robot",
@@ -389,6 +392,7 @@ IMPURE = {
 
 OTHER_CLOCK = {
     "cli.rtde.progress_lines": "paces lines of a terminal",
+    "cli.standby": "measures a switch for a terminal",
     "cli.watch": "paints a terminal; times of the gateway come as ages",
     "loop.clock": "is made of it",
     "rtde.api.loop_thread": "has the clock of every plain loop",
@@ -442,6 +446,10 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "links.canopen_node.objects": "tests/links/canopen_node/test_eds.py, test_status_objects.py, test_variables.py",
     "links.canopen_node.observer": "counters, and calls that do nothing; tests/links/canopen_node/test_node.py",
     "links.contract": "records and protocols; tests/links/test_registry.py",
+    "links.standby.plan": "a record; tests/links/standby/test_language.py",
+    "links.standby.sections": "tests/links/standby/test_language.py",
+    "links.standby.runtime": "tests/links/standby/test_link.py makes its links by it",
+    "cli.standby": "tests/e2e/test_standby.py, with two gateways",
     "links.canopen_node.health": "words; tests/links/canopen_node/test_runtime.py",
     "links.canopen_node.routes": "tests/links/canopen_node/test_node.py, test_runtime.py",
     "links.canopen_node.tables": "tests/cli/test_show.py, tests/report/test_table.py",
@@ -522,6 +530,7 @@ WITHOUT_TEST_FILE: dict[str, str] = {
 """Module -> why it has no test file of its own. A module that is only a docstring needs none."""
 
 TESTED_TOGETHER = {
+    "links.standby.rules": "tests/mapping/test_rules.py",
     "links.canopen_node.rules": "tests/mapping/test_rules.py",
     "links.canopen_node.plc.targets": "tests/links/canopen_node/plc/test_targets.py",
     "links.modbus_server.plc.logix": "tests/links/modbus_server/plc/test_logix.py",

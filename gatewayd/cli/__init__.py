@@ -28,6 +28,7 @@ COMMANDS = {
     "force": "Force a variable to a value, for commissioning.",
     "unforce": "End a force before its time.",
     "token": "Make, list and revoke tokens for the status page and its API.",
+    "standby": "Print which of two gateways serves a cell; hand it over.",
     "rtde": "Work with a robot's RTDE interface, without a mapping.",
     "import": "Make a mapping from a register list, data sheet or recipe.",
     "completion": "Print the completion script of a shell.",

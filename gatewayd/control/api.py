@@ -6,6 +6,7 @@ wrong with it is an `ApiError`, which says what to do.
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import sys
@@ -32,6 +33,8 @@ from gatewayd.control.views import (
 from gatewayd.core.definition import Value, ValueKind
 from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.links.contract import DutyLink
+from gatewayd.logs.records import fields
 from gatewayd.loop.share import LoopShare
 from gatewayd.report.format import interval
 from gatewayd.report.schema import EventMessage, Json, LockStatus, Status, VersionInfo
@@ -42,6 +45,8 @@ STALE_ACT = 0.5
 """Seconds that an act of the operator may have waited while the gateway stood still."""
 MAX_FORCE = 24 * 3600.0
 """Seconds that a force may last at most; it can be renewed."""
+log = logging.getLogger("gatewayd.control")
+
 _MAX_VALUE = sys.float_info.max
 _KINDS_OF_EVENTS = tuple(kind.value for kind in EventKind)
 _Item = TypeVar("_Item")
@@ -237,6 +242,7 @@ class Api:
         """Take a lock; `for` seconds, or until it is released. The lock as it is then."""
         runtime, lock = self._lock(name, body)
         seconds = _seconds(body, required=False)
+        _refuse_standing_by(runtime)
         until = moment.now + seconds
         runtime.cell.operator.take_lock(lock, moment.now, until, caller.detail, caller.holder)
         return lock_view(runtime.cell, lock, moment.now)
@@ -255,6 +261,7 @@ class Api:
         variable = cell.definition.variables[index]
         value = _value(variable.kind, body.get("value"))
         seconds = _seconds(body, required=True)
+        _refuse_standing_by(runtime)
         refusal = cell.operator.force(
             index, value, moment.now, moment.now + seconds, caller.detail, caller.holder
         )
@@ -268,6 +275,18 @@ class Api:
         if not runtime.cell.operator.unforce(index, moment.now, caller.detail):
             raise ApiError(409, "not_forced", f"{name} is not forced")
         return self._view(runtime, index, moment)
+
+    def hand_over(self, name: str, body: Mapping[str, Any], caller: Caller, moment: Moment) -> Json:
+        """Leave the cell of this name to the other gateway. Its status at that moment."""
+        (runtime,) = self._runtimes(name)
+        link = next((link for link in runtime.links.values() if isinstance(link, DutyLink)), None)
+        if link is None:
+            raise ApiError(409, "no_standby", f"there is no second gateway for {name}: its mapping has none")
+        why = link.hand_over(moment.now)
+        if why:
+            raise ApiError(409, "not_handed_over", why)
+        log.warning("cell handed over", extra=fields(cell=name, detail=caller.detail))
+        return cell_view(runtime, self._declarations.of(runtime.plan), moment.now)
 
     # -- inside --------------------------------------------------------------------------------------------------
 
@@ -319,6 +338,13 @@ def _why(refusal: Refusal, runtime: ServedCell) -> str:
         if limits is not None:
             return f"{refusal.reason.text}, {interval(limits.low, limits.high)}"
     return refusal.reason.text
+
+
+def _refuse_standing_by(runtime: ServedCell) -> None:
+    """What somebody takes or forces here would act on nothing, and come to act when this gateway takes over."""
+    why = runtime.cell.standing_by
+    if why:
+        raise ApiError(409, "standing_by", f"{why}; do it at the gateway that serves the cell")
 
 
 def _only(found: list[tuple[ServedCell, int]], what: str, name: str) -> tuple[ServedCell, int]:

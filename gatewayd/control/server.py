@@ -100,6 +100,7 @@ def application(api: Api, reload: Reload | None) -> web.Application:
         "locks/{name}/release": (api.release, Role.OPERATOR),
         "variables/{name}/force": (api.force, Role.ENGINEER),
         "variables/{name}/unforce": (api.unforce, Role.ENGINEER),
+        "cells/{name}/hand-over": (api.hand_over, Role.ENGINEER),
     }
     for name, (act, role) in acts.items():
         found.router.add_post(f"/v1/{name}", routes.act(act, role))

@@ -51,6 +51,8 @@ class Cell:
         self.image = ProcessImage(definition.variables)
         self.ownership = LockTable(definition.locks)
         self.writers = WriterTable(definition.writers, definition.locks)
+        self.standing_by = ""
+        """Why this gateway does not serve the cell, in words: another one does; empty: it does."""
         self.freshness = Freshness(definition.stale_after)
         self.lag = Lag(definition.stale_after)
         self.events = EventRing()

@@ -128,6 +128,10 @@ class LinkKind:
     sheets: ClassVar[str] = ""
     """Module whose `SHEETS` proposes a mapping from a data sheet of its devices (`links.proposals`); empty: none does.
     """
+    stands_by: ClassVar[bool] = False
+    """Its links run while another gateway serves the cell, too: what comes from the robot is read, nobody is served."""
+    decides: ClassVar[bool] = False
+    """Its links are `DutyLink`s: they decide whether this gateway serves the cell. One a cell at most."""
     usual: ClassVar[bool] = False
     """Nearly every cell has one: its runtime is imported while the mapping files are read."""
 
@@ -346,12 +350,63 @@ class SourceLink(Link):
     sent_listeners: list[Callable[[], None]]
     """Called after something that was written has been sent. They must not raise."""
 
+    @property
+    def claim(self) -> Claim:
+        """How its claim stands."""
+        return Claim.HELD
+
+    def ask_claim(self) -> None:
+        """Ask for the claim once, where it is made on request; no effect while an answer is due."""
+
+    def withdraw_claim(self, why: str, now: float) -> None:
+        """Give the claim back: nothing is sent any more, and it is not asked for again before `ask_claim`."""
+
     def read_back(self, variable: int) -> Value | None:
         """What the other side holds of an input, as it said last in this session; None: it does not say so."""
         return None
 
     def tap_packages(self, tap: PackageTap | None) -> None:
         """Hand `tap` every package from now on; None: nobody records any more. Called again and again with the same."""
+
+
+class Claim(Enum):
+    """How the claim of a source link stands to what it writes to."""
+
+    NO_SESSION = "no session"
+    UNASKED = "unasked"
+    ASKED = "asked"
+    HELD = "held"
+    """Ours, and what it holds was read: the cell can be written."""
+    PARTIAL = "partial"
+    """Some of it, without the part that decides: somebody else has that."""
+    REFUSED = "refused"
+    """Somebody else has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Duty:
+    """What a cell has to do at this moment, as its `DutyLink` has decided."""
+
+    serve: bool
+    """Run all of its links; else only those of kinds that `stands_by`."""
+    ask: bool = False
+    """Ask for the claim once."""
+    withdraw: bool = False
+    """Give the claim back."""
+    why: str = ""
+    """In words, where it is not served: by whom it is, or what is waited for."""
+
+
+class DutyLink(Link):
+    """The link that decides whether this gateway serves its cell, or stands by while another one does."""
+
+    def duty(self, claim: Claim, now: float) -> Duty:
+        """What to do now; asked again and again, at least every 20 ms."""
+        raise NotImplementedError
+
+    def hand_over(self, now: float) -> str:
+        """Leave the cell to the other gateway; why that cannot be, or empty: it has begun."""
+        raise NotImplementedError
 
 
 class PrepareError(OSError):
@@ -421,6 +476,8 @@ class Context:
     """Directory of what is kept across restarts."""
     shared: SharedPart | None = None
     """What the kind shares, as `LinkRuntime.share` made it."""
+    on_request: bool = False
+    """Of a source link: it claims nothing before `SourceLink.ask_claim`: another gateway may be at work."""
     former: Link | None = None
     """The link of this name, maybe of another kind, whose `run` has ended or will have before this one's begins."""
 

@@ -36,6 +36,19 @@ class WriterName:
     """Where to say so: the place of all names."""
 
 
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """Something in the plant that acts when it has heard nothing of the gateway for a while."""
+
+    what: str
+    """What it does: `the robot program stops`."""
+    seconds: float
+    position: Position
+    """Where the mapping says so."""
+    remedy: str
+    """How it waits longer, in the imperative."""
+
+
 class LinkLanguage:
     """One kind's sections, places, writers' keys, expansion, compilation and rules."""
 
@@ -91,6 +104,14 @@ class LinkLanguage:
     @staticmethod
     def _keys_of(*tables: type[Section] | None) -> frozenset[str]:
         return frozenset(key for table in tables if table is not None for key in table.model_fields)
+
+    def adopt_for(self, document: Document) -> Iterable[float | None]:
+        """How long adopted inputs wait for an owner, where the kind has a say in it; empty: it has none."""
+        return ()
+
+    def patience(self, document: Document) -> Iterable[Patience]:
+        """What in the plant waits for the gateway, and for how long."""
+        return ()
 
     # -- findings about its sections ---------------------------------------------------------------------------------
 

@@ -25,6 +25,7 @@ LINK_KINDS = (
     "gatewayd.links.canopen_node",
     "gatewayd.links.devices",
     "gatewayd.links.mqtt",
+    "gatewayd.links.standby",
 )
 """Packages, imported when they are used. Their order is that of sections in lists and tables."""
 

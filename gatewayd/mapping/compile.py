@@ -54,7 +54,9 @@ def compile_plan(cell: ExpandedCell) -> Plan:
         writers=tuple(_writer(name, part.spec) for name, part in document.writers.items()),
         stale_after=settings.stale_after,
         clear_on_connect=settings.clear_on_connect,
-        adopt_for=settings.adopt_for,
+        adopt_for=next(
+            (time for kind in languages() for time in kind.adopt_for(document)), settings.adopt_for
+        ),
     )
     links = {name: link for kind in languages() for name, link in kind.compile_links(cell).items()}
     plan = Plan(document.source.name, definition, links)

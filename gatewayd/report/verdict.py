@@ -123,8 +123,13 @@ def judge(cell: Cell, source: LinkHealth, links: Mapping[str, LinkHealth], now: 
             *(finding.text for finding in (*held, *of_gateway, *lost.values()) if not finding.passing),
         ),
         unserved=tuple(finding.text for finding in unserved),
-        robot=_part("Robot", [*unserved, *held], "fresh and writable", _rate(cell, source)),
-        gateway=_part("Gateway", of_gateway, "running", _good(cell)),
+        robot=_part(
+            "Robot",
+            [*unserved, *held],
+            "read only" if cell.standing_by else "fresh and writable",
+            _rate(cell, source),
+        ),
+        gateway=_part("Gateway", of_gateway, cell.standing_by or "running", _good(cell)),
         links={
             name: PicturePart(health.name, health.level, health.words, health.detail)
             for name, health in links.items()
@@ -163,7 +168,7 @@ def _unserved(cell: Cell, source: LinkHealth, now: float) -> Iterator[_Finding]:
         why = f": {'; '.join(source.problems)}" if state is Source.LOST and source.problems else ""
         since = _since(now - cell.freshness.last_progress)
         yield _Finding(SOURCE_LEVELS[state], f"robot {SOURCES[state]}{since}{why}")
-    elif not cell.accepts_writes:
+    elif not cell.accepts_writes and not cell.standing_by:
         yield _Finding(Level.WARN, "the robot's inputs are not adopted yet, nothing can be written")
 
 

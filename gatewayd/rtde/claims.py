@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from itertools import count
 from types import MappingProxyType
 
@@ -29,14 +30,33 @@ WATCHDOG_KEY = "watchdog"
 """Key of the watchdog field's own recipe: whatever else is written must not feed it."""
 REFUSED = "REFUSED"
 """Our word for fields whose recipe the controller refused without saying why."""
+UNASKED = "UNASKED"
+"""Our word for fields that are claimed on request, and were not asked for yet."""
 
 MAX_RECIPES = 255
 """Input recipes of a connection; ids count from 1."""
 
 _IDS_FOR_RETRIES = 64
 """Recipe ids that joins leave over for inputs that become free later."""
-_RETRIED = frozenset({IN_USE, REFUSED})
+_RETRIED = frozenset({IN_USE, REFUSED, UNASKED})
 _FAMILIES = tuple({needs.mask.removesuffix("_mask"): None for needs in COMPANIONS.values()})
+
+
+class ClaimStanding(Enum):
+    """How claims on request stand. The first field that the controller has decides: who holds it holds the robot.
+
+    Every client with the same wishes asks for it first, so of several that ask at one time exactly one gets it.
+    """
+
+    UNASKED = "unasked"
+    ASKED = "asked"
+    """An answer is due."""
+    HELD = "held"
+    """The field that decides is ours; others may be in use elsewhere and are asked for again."""
+    PARTIAL = "partial"
+    """Others are ours, and the one that decides is not."""
+    REFUSED = "refused"
+    """Nothing is ours."""
 
 
 class HandshakeError(Exception):
@@ -126,7 +146,9 @@ class Claims:
         *,
         limited: bool = False,
         recipes: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
+        on_request: bool = False,
     ) -> None:
+        """`on_request`: nothing is asked for before `retry`, nor again by itself before the claim is decided."""
         members: dict[str, list[str]] = {}
         for name in dict.fromkeys((*fields, *((watchdog,) if watchdog else ()))):
             members.setdefault(WATCHDOG_KEY if name == watchdog else recipe_key(name), []).append(name)
@@ -142,6 +164,12 @@ class Claims:
         self.exhausted = False
         """Whether a request was wanted after all recipe ids of the connection had been used."""
         self._limited = False
+        self._on_request = on_request
+        self._requested = not on_request
+        """Whether groups may be asked for."""
+        self._wanted = tuple(name for group in self._groups for name in group.wanted)
+        for group in self._groups if on_request else ():
+            group.refused = dict.fromkeys(group.wanted, UNASKED)
         self._enqueue(self._groups)
         if limited:
             self.limit()
@@ -166,8 +194,23 @@ class Claims:
 
     @property
     def retriable(self) -> bool:
-        """Whether asking again may help for some field."""
+        """Whether asking again by itself may help for some field."""
+        if self._on_request and self.standing is not ClaimStanding.HELD:
+            return False
         return any(group.retriable() for group in self._groups)
+
+    @property
+    def standing(self) -> ClaimStanding:
+        """How the claims stand as a whole."""
+        if not self._requested:
+            return ClaimStanding.UNASKED
+        if self._queue:
+            return ClaimStanding.ASKED
+        refused, held = self.refused, self.types
+        decides = next((name for name in self._wanted if refused.get(name, IN_USE) in _RETRIED), None)
+        if decides in held:
+            return ClaimStanding.HELD
+        return ClaimStanding.PARTIAL if held else ClaimStanding.REFUSED
 
     @property
     def busy(self) -> bool:
@@ -205,7 +248,8 @@ class Claims:
         self._enqueue([group for group in self._groups if group.named and group.held is None])
 
     def retry(self) -> None:
-        """Ask again for the fields that were in use; no effect while asking."""
+        """Ask again for the fields that were in use, or were not asked for yet; no effect while asking."""
+        self._requested = True
         if not self._queue:
             self._enqueue([group for group in self._groups if group.retriable()])
 
@@ -223,7 +267,7 @@ class Claims:
             settled = group not in self._queue and not set(staying) & set(group.names_held())
             group.wanted, group.held = staying, None
             self._replace(group, [*([group] if staying else ()), *alone])
-            if settled and staying:
+            if settled and staying and group in self._queue:
                 self._queue.remove(group)
 
     def join(self, fields: Iterable[str]) -> None:
@@ -281,6 +325,8 @@ class Claims:
         return changed
 
     def _enqueue(self, groups: Iterable[_Group]) -> None:
+        if not self._requested:
+            return
         for group in groups:
             group.asking = group.candidates()
             if group.asking and group not in self._queue:

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from gatewayd.loop.connect import DeadPeer, connect
 from gatewayd.loop.progress import wait_with_progress
-from gatewayd.rtde.claims import InputRecipe
+from gatewayd.rtde.claims import ClaimStanding, InputRecipe
 from gatewayd.rtde.connection import Connection
 from gatewayd.rtde.handler import ClientHandler, ConnectionObserver
 from gatewayd.rtde.lists import ListMemory
@@ -87,6 +87,22 @@ class RtdeClient:
         """
         if self._connection is not None:
             self._connection.join(fields)
+
+    def claim(self) -> None:
+        """Ask once for the inputs that are claimed on request; no effect while an answer is due.
+
+        `ClientHandler.inputs_changed` reports what was claimed, `standing` how the claim stands as a whole.
+        """
+        if self.session is not None and self._connection is not None:
+            self._connection.claim()
+
+    @property
+    def standing(self) -> ClaimStanding | None:
+        """How claims on request stand; None without a session."""
+        connection = self._connection
+        return (
+            connection.claims.standing if connection is not None and connection.session is not None else None
+        )
 
     def probe(self) -> bool:
         """Ask the controller something whose answer queues behind the packages: `ClientHandler.probed` reports when.

@@ -68,12 +68,13 @@ class Connection(asyncio.BufferedProtocol):
         self.receiver = PackageReceiver(self.buffer_updated, self._interrupted)
         """The way in, and who reads it."""
         self._negotiation = Negotiation(settings)
+        self.claims = self._negotiation.claims
         self._complained = False
         self._lost = loop.create_future()
         self._waiters = Waiters()
         self._deadline = Deadline(self._unanswered)
         self._check = Deadline(self._watch)
-        self._retry = RetryTimer(settings.claim_retry, self._retry_claims)
+        self._retry = RetryTimer(settings.claim_retry, self.claim)
         self._probe = ProbeTimer(settings.handshake_timeout, self._probe_ended)
         self._asked_at: float | None = None
         self._round_trip = 0.0
@@ -111,6 +112,11 @@ class Connection(asyncio.BufferedProtocol):
         """Have unread registers share a recipe with the others."""
         if self.session is not None and not self.done.done():
             self._claim(self._negotiation.join(fields))
+
+    def claim(self) -> None:
+        """Ask for inputs that are in use or were not asked for yet; only with a session, and if no answer is due."""
+        self._claim(self._negotiation.retry_claims())
+        self._schedule_retry()
 
     def probe(self) -> bool:
         """Ask something whose answer queues behind the packages; False if no answer can be expected to it."""
@@ -458,10 +464,6 @@ class Connection(asyncio.BufferedProtocol):
     def _schedule_retry(self) -> None:
         if self._negotiation.claims.retriable and not self.done.done():
             self._retry.schedule()
-
-    def _retry_claims(self) -> None:
-        self._claim(self._negotiation.retry_claims())
-        self._schedule_retry()
 
     def _claim(self, request: ExecutableMessage | None) -> None:
         if self._negotiation.claims.exhausted:

@@ -39,7 +39,13 @@ class Negotiation:
     def __init__(self, wishes: Wishes) -> None:
         self.state = State.NEW
         """What is awaited."""
-        self.claims = Claims(wishes.inputs, wishes.watchdog, limited=wishes.limited, recipes=wishes.recipes)
+        self.claims = Claims(
+            wishes.inputs,
+            wishes.watchdog,
+            limited=wishes.limited,
+            recipes=wishes.recipes,
+            on_request=wishes.claim_on_request,
+        )
         """The inputs."""
         self.controller: messages.ControllerVersion | None = None
         """The controller's software, once it is known."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from gatewayd.report.format import address
 from gatewayd.rtde.catalogue import likely_holders
-from gatewayd.rtde.claims import REFUSED, InputRecipe
+from gatewayd.rtde.claims import REFUSED, UNASKED, InputRecipe
 from gatewayd.rtde.fields import OUTPUTS, Series, SoftwareVersion
 from gatewayd.rtde.messages import IN_USE, NOT_FOUND, ControllerVersion
 from gatewayd.rtde.recipe import Recipe, Scalar
@@ -38,6 +38,8 @@ class Wishes:
 
     Else they are read right after they were claimed and not again.
     """
+    claim_on_request: bool = False
+    """Claim nothing before `RtdeClient.claim` asks for it: another client may have the inputs, and is to keep them."""
     limited: bool = False
     """Send no list of names of more than `OLD_LIST_LIMIT` bytes: the controller does not take it."""
     running: bool = True
@@ -164,6 +166,8 @@ def input_hint(name: str, word: str, software: SoftwareVersion | None = None) ->
         return f"probably claimed by {likely_holders(name, software)}"
     if word == NOT_FOUND:
         return "this controller's software does not have the input"
+    if word == UNASKED:
+        return "it was not asked for yet"
     return f"the controller answered {word}"
 
 

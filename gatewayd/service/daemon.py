@@ -10,17 +10,17 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
 from gatewayd.core.cell import Cell
-from gatewayd.links.contract import Link, SharedPart, TapOf
+from gatewayd.links.contract import Duty, Link, SharedPart, TapOf
 from gatewayd.loop import clock
 from gatewayd.loop.retry import keep_running
 from gatewayd.mapping.plan import Plan
-from gatewayd.service.cell_runtime import CellRuntime
+from gatewayd.service.cell_runtime import CellRuntime, standing_by
 from gatewayd.service.shared_parts import AllPrepared, SharedParts
 
 TICK = 0.02
@@ -119,6 +119,11 @@ class Daemon:
         """Whether there is anything to swap: false before `run` and once it stops."""
         return self._group is not None
 
+    def served(self, plans: Sequence[Plan]) -> list[Plan]:
+        """These plans with the links alone that would run now: what a cell that stands by needs, it needs later."""
+        serving = {runtime.plan.cell.name for runtime in self.runtimes if runtime.serving}
+        return [plan if plan.cell.name in serving else standing_by(plan) for plan in plans]
+
     def swap(self, plans: Sequence[Plan], now: float, prepared: AllPrepared | None = None) -> list[str]:
         """Serve these plans instead, between two packages; cells are known by their names. `prepared`: by `shared`.
 
@@ -157,15 +162,50 @@ class Daemon:
         return runtime
 
     def _replace(self, runtime: CellRuntime, plan: Plan, now: float) -> tuple[str, ...]:
-        former = runtime.links
+        former = dict(runtime.links)
         stranded = runtime.succeed(plan, now)
         self._show(runtime.cell)
-        gone = [name for name, link in former.items() if runtime.links.get(name) is not link]
+        self._change(former, runtime.links)
+        return stranded
+
+    def _change(self, former: Mapping[str, Link], links: Mapping[str, Link]) -> None:
+        """End the links that are gone, and begin those that are new; of one name one after the other."""
+        gone = [name for name, link in former.items() if links.get(name) is not link]
         ended = {name: self._end(former[name]) for name in gone}
-        for name, link in runtime.links.items():
+        for name, link in links.items():
             if link is not former.get(name):
                 self._begin(link, link.run, ended.get(name))
-        return stranded
+
+    # -- which gateway serves a cell -----------------------------------------------------------------------------
+
+    def _do_duty(self, runtime: CellRuntime, now: float) -> None:
+        """Do what the cell's `DutyLink` says, if it has one."""
+        link = runtime.duty
+        if link is None:
+            return
+        duty = link.duty(runtime.source.claim, now)
+        if duty.serve is not runtime.serving:
+            self._turn(runtime, duty, now)
+            return
+        if not duty.serve:
+            runtime.cell.standing_by = duty.why
+        if duty.withdraw:
+            runtime.source.withdraw_claim(duty.why, now)
+        if duty.ask:
+            runtime.source.ask_claim()
+
+    def _turn(self, runtime: CellRuntime, duty: Duty, now: float) -> None:
+        """Begin to serve the cell, or leave it."""
+        former, cell = dict(runtime.links), runtime.cell
+        if duty.serve:
+            runtime.take_over(now)
+        else:
+            runtime.stand_by(duty.why, now)
+            self._show(runtime.cell)
+        self._change(former, runtime.links)
+        self._begin_shared()
+        successors = {cell: runtime.cell} if runtime.cell is not cell else {}
+        self.shared.serve(self.runtimes, successors)
 
     def _show(self, cell: Cell) -> None:
         for observer in self._observers:
@@ -177,7 +217,7 @@ class Daemon:
         return CellRuntime(plan, self._state, now, self.shared.of)
 
     def _begin_cell(self, runtime: CellRuntime) -> None:
-        self._begin(runtime, partial(_tick, runtime))
+        self._begin(runtime, partial(_tick, runtime, self._do_duty))
         for link in runtime.links.values():
             self._begin(link, link.run)
 
@@ -230,11 +270,13 @@ class Daemon:
                 await asyncio.gather(*(link.close() for link in links))
 
 
-async def _tick(runtime: CellRuntime) -> None:
+async def _tick(runtime: CellRuntime, do_duty: Callable[[CellRuntime, float], None]) -> None:
     while True:
+        now = clock.judged_now()
+        do_duty(runtime, now)
         adoption = runtime.cell.adoption
         adoption.reachable = adoption.reachable or runtime.reachable
-        runtime.cell.tick(clock.judged_now())
+        runtime.cell.tick(now)
         await asyncio.sleep(TICK)
 
 

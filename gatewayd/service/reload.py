@@ -220,7 +220,7 @@ class Reloader:
         if refusal is not None:
             return refusal
         try:
-            prepared = await self._daemon.shared.prepare(plans)
+            prepared = await self._daemon.shared.prepare(self._daemon.served(plans))
         except PrepareError as error:
             return ReloadOutcome(Result.FAILED, (reason_of(error),))
         await self._settle()
@@ -261,7 +261,7 @@ class Reloader:
                 found += (CellObjection(name, each) for each in objections_of_change(runtimes[name], changes))
         for name in sorted(runtimes.keys() - {plan.cell.name for plan in plans}):
             found += (CellObjection(name, each) for each in objections_of_removal(runtimes[name]))
-        disturbed = self._daemon.shared.disturbs(plans)
+        disturbed = self._daemon.shared.disturbs(self._daemon.served(plans))
         found += (CellObjection(cell.definition.name, each) for cell, each in disturbed)
         return tuple(found)
 

@@ -88,6 +88,7 @@ _SECTIONS = {
     "MqttTls": "`mqtt: tls:`",
     "MqttStore": "`mqtt: store:`",
     "SparkplugSection": "`mqtt: sparkplug:`",
+    "Standby": "`standby:`",
     "WriterSpec": "`writers:` NAME`:`",
     "Group": "`groups:` NAME`:`",
     "VariableSpec": "`variables:` NAME`:`",

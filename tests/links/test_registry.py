@@ -57,6 +57,7 @@ def test_every_kind_has_a_decoder_of_its_own() -> None:
         "canopen": Medium.CAN,
         "device": Medium.OTHER,
         "mqtt": Medium.TCP_CLIENT,
+        "standby": Medium.OTHER,
     }
     assert decoder_of("modbus") is not decoder_of("modbus"), (
         "what one remembers is none of the other's business"

@@ -13,7 +13,8 @@ from gatewayd.mapping.typed import Invalid
 def test_keys_come_in_the_order_of_the_kinds() -> None:
     """Hints, the schema and the reference list them so."""
     assert list(FILE.model_fields) == [
-        "gatewayd", "cell", "robot", "modbus", "canopen", "devices", "writers", "groups", "variables", "tests",
+        "gatewayd", "cell", "robot", "modbus", "canopen", "devices", "mqtt", "standby", "writers", "groups",
+        "variables", "tests",
     ]  # fmt: skip
     assert list(VARIABLE.model_fields) == [
         "robot", "dashboard", "modbus", "canopen", "device", "owner", "takeover", "lease", "group", "limits", "clamp",

@@ -8,8 +8,10 @@ from gatewayd.rtde.catalogue import OLD_LIST_LIMIT
 from gatewayd.rtde.claims import (
     REFUSED,
     REGISTERS_KEY,
+    UNASKED,
     WATCHDOG_KEY,
     Claims,
+    ClaimStanding,
     HandshakeError,
     recipe_key,
     sort_types,
@@ -18,6 +20,7 @@ from gatewayd.rtde.fields import INPUTS
 from gatewayd.rtde.messages import IN_USE, NOT_FOUND, InputsSetup, SetupInputs
 from gatewayd.rtde.types import DataType
 
+WATCHDOG = "input_int_register_23"
 REGISTERS = tuple(f"input_int_register_{number}" for number in range(6))
 
 
@@ -367,3 +370,51 @@ def test_named_recipes_change_and_what_stays_keeps_its_id(
     assert held(claims) == {key: names for key, names in free.items() if names}
     for key, recipe in claims.recipes.items():
         assert (recipe.id == ids.get(key)) == (before.get(key) == after[key])
+
+
+def test_claims_on_request_ask_for_nothing_by_themselves() -> None:
+    claims = Claims(REGISTERS, limited=True, on_request=True)
+    assert claims.request() is None
+    assert (claims.standing, claims.retriable) == (ClaimStanding.UNASKED, False)
+    assert set(claims.refused) == set(REGISTERS)
+    assert set(claims.refused.values()) == {UNASKED}
+    claims.retry()
+    assert claims.busy
+    Controller().converse(claims)
+    assert claims.standing is ClaimStanding.HELD
+    assert held(claims) == {REGISTERS_KEY: REGISTERS}
+    assert not claims.refused
+
+
+def test_a_claim_on_request_that_is_refused_is_not_repeated_by_itself() -> None:
+    claims = Claims(REGISTERS, WATCHDOG, on_request=True)
+    claims.retry()
+    Controller(taken={*REGISTERS, WATCHDOG}).converse(claims)
+    assert (claims.standing, claims.retriable) == (ClaimStanding.REFUSED, False)
+    claims.retry()
+    Controller().converse(claims)
+    assert claims.standing is ClaimStanding.HELD
+
+
+def test_the_first_field_that_there_is_decides() -> None:
+    controller = Controller(taken={REGISTERS[1]}, missing={REGISTERS[0]})
+    claims = Claims(REGISTERS, on_request=True)
+    claims.retry()
+    controller.converse(claims)
+    assert claims.standing is ClaimStanding.PARTIAL
+    assert not claims.retriable, "the others are to be given back, not completed"
+    controller = Controller(taken={REGISTERS[2]}, missing={REGISTERS[0]})
+    claims = Claims(REGISTERS, on_request=True)
+    claims.retry()
+    controller.converse(claims)
+    assert (claims.standing, claims.retriable) == (ClaimStanding.HELD, True)
+
+
+def test_registers_that_cannot_be_read_are_set_apart_without_being_asked_for() -> None:
+    claims = Claims(REGISTERS, on_request=True)
+    claims.separate([REGISTERS[2]])
+    assert claims.request() is None
+    claims.retry()
+    Controller().converse(claims)
+    assert claims.standing is ClaimStanding.HELD
+    assert held(claims)[REGISTERS[2]] == (REGISTERS[2],)

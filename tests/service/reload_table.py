@@ -155,6 +155,7 @@ def keys_of(name: str, table: Mapping[str, Any]) -> str:
     return " ".join(f"{name}.{key}" for key in table)
 
 
+STANDBY = {"peer": ["127.0.0.8:2930"], "grace": "100s"}
 BOTH, PLC, LINE, NOBODY = "plc line", "plc", "line", ""
 
 
@@ -362,6 +363,14 @@ ROWS: dict[str, list[Row]] = {
         row("robot.dashboard.port", 1505, given=DASHBOARD),
         row("robot.dashboard.programs", {1: "place.urp"}, given=DASHBOARD),
         row("robot.dashboard.poll", "2s", given=DASHBOARD),
+    ],
+    "standby": [
+        Row("standby", {"standby": {**STANDBY, "grace": "100ms"}}, "release", NOBODY),
+        row("standby.peer", ["127.0.0.8:2931"], given={"standby": STANDBY}),
+        row("standby.listen", "127.0.0.1:2932", given={"standby": STANDBY}),
+        row("standby.grace", "50s", given={"standby": STANDBY}),
+        row("standby.grace", "none", "weakening", given={"standby": STANDBY}),
+        row("standby.address", "192.0.2.50", given={"standby": STANDBY}),
     ],
     "groups": [
         Row(

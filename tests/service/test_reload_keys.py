@@ -118,7 +118,7 @@ class Rig:
     def _listening(self) -> bool:
         shared = self.daemon.shared.of("modbus")
         assert isinstance(shared, Listeners)
-        return all(listener.listening for listener in shared.listeners)
+        return bool(shared.listeners) and all(listener.listening for listener in shared.listeners)
 
     def send(self, can_id: int, data: bytes) -> None:
         self.peer.send(can.Message(arbitration_id=can_id, data=data, is_extended_id=False))

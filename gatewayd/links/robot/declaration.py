@@ -22,6 +22,7 @@ class RobotKind(LinkKind):
     exports = "gatewayd.links.robot.urscript.export"
     doctor = "gatewayd.links.robot.doctor"
     usual = True
+    stands_by = True
     fields = {  # noqa: RUF012 - never changed
         "address": "host:port of the controller",
         "state": "`lost`, `waiting`, `fresh`, `silent`, `frozen` or `late`",

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar, Final
 
 from gatewayd.core.definition import Direction
-from gatewayd.links.language import DefiningLanguage, WriterName
+from gatewayd.links.language import DefiningLanguage, Patience, WriterName
 from gatewayd.links.robot.dashboard.sections import DashboardPlace, DashboardSection
 from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.definition import define, type_of
-from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
+from gatewayd.links.robot.plan import WATCHDOG_MARGIN, RobotPlan, WatchdogPlan
 from gatewayd.links.robot.rates import package_period, package_rate
 from gatewayd.links.robot.reference import is_bit_register, is_known
 from gatewayd.links.robot.sections import (
@@ -120,6 +120,17 @@ class RobotLanguage(DefiningLanguage):
                     "a watchdog cannot require `any`",
                     robot.at("watchdog", "requires"),
                 )
+
+    def patience(self, document: Document) -> Iterable[Patience]:
+        """The robot program, by its watchdog; its call in the generated program waits for two feeds."""
+        robot = document.part(RobotSection)
+        if robot is not None and robot.spec.watchdog is not None:
+            yield Patience(
+                "the robot program stops",
+                WATCHDOG_MARGIN / robot.spec.watchdog.frequency,
+                robot.key_at("watchdog"),
+                "feed the watchdog less often (`frequency: 1`)",
+            )
 
     def define(self, line: Part[VariableSpec], document: Document) -> tuple[Sequence[Defined], bool]:
         """The values that a line names, in order, and whether they are a family."""

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 from gatewayd.mapping.plan import NO_MEANING, LinkPlan, Plan
 
+WATCHDOG_MARGIN = 2
+"""Feeds that `rtde_set_watchdog` of the generated program waits for: one that comes late stops nothing."""
+
 
 @dataclass(frozen=True, slots=True)
 class WatchdogPlan:

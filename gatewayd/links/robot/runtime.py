@@ -17,6 +17,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, FallbackKind, Value
 from gatewayd.core.image import Quality
 from gatewayd.links.contract import (
+    Claim,
     Context,
     Level,
     LinkHealth,
@@ -27,6 +28,7 @@ from gatewayd.links.contract import (
     Tap,
 )
 from gatewayd.links.robot.availability import unavailable
+from gatewayd.links.robot.claiming import claim_of
 from gatewayd.links.robot.companions import Driven, all_inputs, all_outputs
 from gatewayd.links.robot.controller import ControllerNotes
 from gatewayd.links.robot.declaration import KIND
@@ -40,6 +42,7 @@ from gatewayd.links.robot.watchdog import WatchdogFeed
 from gatewayd.loop import clock
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address
+from gatewayd.rtde.claims import ClaimStanding
 from gatewayd.rtde.client import RtdeClient
 from gatewayd.rtde.loss import Loss, LossReason
 from gatewayd.rtde.messages import TextMessage
@@ -58,10 +61,16 @@ class RobotLink(SourceLink):
     title = "robot link"
     plan: RobotPlan
 
-    def __init__(self, plan: RobotPlan, cell: Cell, former: RobotLink | None = None) -> None:
-        """With a `former` link the counters go on; its `run` must have ended before this one's begins."""
+    def __init__(
+        self, plan: RobotPlan, cell: Cell, former: RobotLink | None = None, *, on_request: bool = False
+    ) -> None:
+        """With a `former` link the counters go on; its `run` must have ended before this one's begins.
+
+        `on_request`: inputs are claimed when `ask_claim` says so, and neither adopted nor written before.
+        """
         self.plan = plan
         self._cell = cell
+        self._on_request = on_request
         watchdog, variables = plan.watchdog, cell.definition.variables
         self._client = RtdeClient(
             ClientSettings(
@@ -72,6 +81,7 @@ class RobotLink(SourceLink):
                 watchdog=watchdog.field if watchdog is not None else None,
                 frequency=plan.frequency,
                 read_back=plan.verify,
+                claim_on_request=on_request,
             ),
             self,
         )
@@ -187,6 +197,28 @@ class RobotLink(SourceLink):
             if variables[index].on_release.kind is not FallbackKind.HOLD
         ]
 
+    @property
+    def claim(self) -> Claim:
+        """How the claim of the inputs stands."""
+        return claim_of(self._client.standing, adopted=self._cell.accepts_writes)
+
+    def ask_claim(self) -> None:
+        """Claim the inputs, if they are free. What the session reads of them is adopted with the next package."""
+        self._client.claim()
+
+    def withdraw_claim(self, why: str, now: float) -> None:
+        """End the session, which is the only way to give inputs back; the next one claims nothing by itself."""
+        self._client.reconnect(why)
+        self._inputs = ClaimedInputs()
+        self._session = self._agreed = None
+        self._cancel_timers()
+        self._cell.robot_lost(why, now)
+
+    @property
+    def _is_claimed(self) -> bool:
+        """Whether inputs are ours as a whole: until then none is adopted, whatever the session has of them."""
+        return not self._on_request or self._client.standing is ClaimStanding.HELD
+
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`. The packages that waited have their own time."""
         self._client.gap()
@@ -238,7 +270,7 @@ class RobotLink(SourceLink):
         if session is None:
             return
         variables = cell.definition.variables
-        reasons = unavailable(session, variables, dict(self.plan.types))
+        reasons = self._unavailable(session)
         self._outputs = SessionOutputs(variables, self._outputs.slots, reasons)
         self._adopting = True
         held = self._inputs.rebind(variables, reasons)
@@ -256,11 +288,12 @@ class RobotLink(SourceLink):
         """The set-up is complete; the first package follows."""
         now = clock.now()
         variables = self._cell.definition.variables
-        reasons = unavailable(session, variables, dict(self.plan.types))
+        reasons = self._unavailable(session)
         self._outputs = SessionOutputs(variables, session.outputs.slots, reasons)
         self._cycle = 1 / session.series.base_rate if session.series is not None else _CYCLE_UNKNOWN
         self._inputs = ClaimedInputs(variables, session, self._driven, self._cycle)
-        self._session = self._agreed = session
+        self._session = session if self._is_claimed else None
+        self._agreed = session
         self._connection.connected()
         self._notes.agreed(session)
         rate = f"{1 / session.period:g} Hz"
@@ -275,7 +308,8 @@ class RobotLink(SourceLink):
 
         New ones can be written once the next package has shown what they hold. The former recipes serve until then.
         """
-        self._session = session
+        if self._is_claimed:
+            self._session = session
 
     def values(self, flat: Sequence[Value], now: float) -> None:
         """A package."""
@@ -340,6 +374,16 @@ class RobotLink(SourceLink):
         health.late = statistics.late
         health.frequency = statistics.frequency
 
+    def _unavailable(self, session: Session) -> dict[int, str]:
+        """Variables that the session does not serve, and why. Of inputs that we do not claim yet nothing is known."""
+        variables = self._cell.definition.variables
+        reasons = unavailable(session, variables, dict(self.plan.types))
+        if self._is_claimed:
+            return reasons
+        return {
+            index: why for index, why in reasons.items() if variables[index].direction is Direction.OUTPUT
+        }
+
     def _report_availability(self, reasons: Mapping[int, str], now: float) -> None:
         self._notes.refused(self._agreed, reasons, self._cell.definition.variables)
         for index, reason in reasons.items():
@@ -351,7 +395,7 @@ class RobotLink(SourceLink):
     def _adopt(self, session: Session, flat: Sequence[Value], now: float) -> None:
         """Take over what the controller's inputs hold, as the package reads them back."""
         self._session, self._agreed = None, session
-        reasons = unavailable(session, self._cell.definition.variables, dict(self.plan.types))
+        reasons = self._unavailable(session)
         self._adopting = True
         adopted = self._inputs.adopt(session, flat, now, reasons)
         self._report_availability(reasons, now)
@@ -442,10 +486,10 @@ class RobotRuntime(LinkRuntime):
         assert isinstance(plan, RobotPlan)
         former = context.former
         if not isinstance(former, RobotLink):
-            return RobotLink(plan, cell)
+            return RobotLink(plan, cell, on_request=context.on_request)
         needs = "has another robot" if KIND.moved(former.plan, plan) else "needs another session"
         cell.robot_lost(f"the new mapping {needs}", context.now)
-        return RobotLink(plan, cell, former)
+        return RobotLink(plan, cell, former, on_request=context.on_request)
 
 
 RUNTIME = RobotRuntime()

@@ -9,7 +9,7 @@ from typing import Final
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.links.exports import Export, ExportError, ExportOption
-from gatewayd.links.robot.plan import WatchdogPlan, robot_of
+from gatewayd.links.robot.plan import WATCHDOG_MARGIN, WatchdogPlan, robot_of
 from gatewayd.links.robot.urscript import handshake as handshakes
 from gatewayd.links.robot.urscript import selftest
 from gatewayd.links.robot.urscript.accessors import accessors, index_check, wrapped
@@ -19,8 +19,6 @@ from gatewayd.links.robot_program import self_test_rounds
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.wording import alternatives, did_you_mean
 
-_MARGIN = 2
-"""The program stops when so many feeds in a row are missing."""
 _PREFIX = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 
 
@@ -99,7 +97,7 @@ def _watch(cell: CellDefinition, watchdog: WatchdogPlan, prefix: str) -> Iterato
     yield ""
     yield from wrapped(f"call it once, before the loop: the program stops when {gone} is gone")
     yield f"def {prefix}_watch():"
-    yield f'  rtde_set_watchdog("{watchdog.field}", {watchdog.frequency / _MARGIN:.6g}, "stop")'
+    yield f'  rtde_set_watchdog("{watchdog.field}", {watchdog.frequency / WATCHDOG_MARGIN:.6g}, "stop")'
     yield "end"
 
 
