@@ -52,6 +52,9 @@ async def load_library() -> None:
 class ClientUser(Protocol):
     """What the user of a client gets to know. Nothing of it may raise."""
 
+    async def preparing(self) -> None:
+        """An attempt is about to be made; it may wait for a moment."""
+
     def will(self) -> Message | None:
         """What the broker is to publish when the connection ends without a word; asked before each attempt."""
 
@@ -127,10 +130,9 @@ class MqttClient:
             self._connection.gap(since, until)
 
     def reconnect(self, reason: str) -> None:
-        """End this connection, and have another one."""
+        """End this connection, and have another one. What was published before is sent before."""
         if self._connection is not None:
-            self._connection.leave()
-            self._connection.end(reason)
+            asyncio.get_running_loop().call_soon(self._connection.leave, reason)
 
     async def leave(self) -> None:
         """Say good-bye; `run` ends by that, or is cancelled afterwards."""
@@ -178,6 +180,7 @@ class MqttClient:
     async def _open(self) -> BrokerConnection:
         """A connection that the broker has taken. Raises OSError."""
         await load_library()
+        await self._user.preparing()
         credentials = BrokerCredentials()
         if needs_files(self.settings):
             read = in_daemon_thread(partial(read_credentials, self.settings), "mqtt credentials")

@@ -129,12 +129,15 @@ class BrokerConnection(asyncio.Protocol):
         if topics and self.accepted.done() and not self.lost.done():
             self._engine.unsubscribe(topics)
 
-    def leave(self) -> None:
+    def leave(self, reason: str = "the gateway has left") -> None:
         """Say DISCONNECT, so that the broker keeps the will to itself, and close when all was sent."""
         if self.accepted.done() and not self.lost.done():
             self._engine.end()
         if self._transport is not None:
             self._transport.close()
+        self.writable = False
+        if not self.lost.done():
+            self.lost.set_result(reason)
 
     def end(self, reason: str) -> None:
         """The connection is no more, for this reason."""
@@ -145,7 +148,8 @@ class BrokerConnection(asyncio.Protocol):
             self.accepted.set_exception(ConnectionRefusedError(reason))
             # Whoever waited may be gone.
             self.accepted.exception()
-        if self._transport is not None:
+        # One that is closing has something left to send; it ends by itself.
+        if self._transport is not None and not self._transport.is_closing():
             self._transport.abort()
 
     # -- inside ------------------------------------------------------------------------------------------------------

@@ -146,15 +146,17 @@ class EdgeNode:
 
     # -- the devices -------------------------------------------------------------------------------------------------
 
-    def values(self, device: str, values: Mapping[str, MetricValue], now: float) -> None:
-        """Metrics of a device (empty: of the edge node) have changed. They are sent, or kept."""
+    def values(
+        self, device: str, values: Mapping[str, MetricValue], now: float, *, keep: bool = True
+    ) -> None:
+        """Metrics of a device (empty: of the edge node) have changed. They are sent, or kept where `keep` says so."""
         one = self._roster.get(device)
         for name, value in values.items():
             if value.value is not None:
                 encode_value(one.metrics[name].type, value.value)
         one.latest.update(values)
         one.unsent.update(dict.fromkeys(values))
-        if not self._send_unsent(one, now):
+        if not self._send_unsent(one, now) and keep:
             for name, value in values.items():
                 self.history.add(device, StoredValue(name, value, now))
 

@@ -31,6 +31,10 @@ class User:
         self.answers: dict[str, str] = {}
         self.losses: list[str] = []
         self.connections = 0
+        self.attempts = 0
+
+    async def preparing(self) -> None:
+        self.attempts += 1
 
     def will(self) -> Message:
         return Message("a/available", b"offline", 0, retain=True)

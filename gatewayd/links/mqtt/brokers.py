@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from gatewayd.core.cell import Cell
 from gatewayd.links.contract import Link, Prepared, PrepareError, SharedPart, Tap
+from gatewayd.links.mqtt.json_link import JsonLink
 from gatewayd.links.mqtt.link import MqttLink
 from gatewayd.links.mqtt.plan import MqttPlan
 from gatewayd.links.mqtt.session import BrokerSession
+from gatewayd.loop import clock
 from gatewayd.mapping.plan import Plan
 from gatewayd.mqtt.client import NotInstalledError, load_library
+from gatewayd.mqtt.messages import BrokerSettings
 from gatewayd.report.format import address
 
 
@@ -29,7 +33,9 @@ class Brokers(SharedPart):
     """All connections of the daemon."""
 
     def __init__(self) -> None:
-        self._sessions: dict[MqttLink, BrokerSession] = {}
+        self._sessions: dict[BrokerSettings, BrokerSession] = {}
+        self.state = Path()
+        """Directory of what is kept across restarts."""
         self._group: asyncio.TaskGroup | None = None
         self._ending: set[asyncio.Task[None]] = set()
         self._tap: Tap | None = None
@@ -70,19 +76,34 @@ class Brokers(SharedPart):
         return _NothingToPrepare()
 
     def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
-        """Have a connection for each of these, and no other."""
-        wanted = [link for link in links if isinstance(link, MqttLink)]
-        for link, session in list(self._sessions.items()):
-            if link not in wanted:
-                del self._sessions[link]
+        """Have a connection for each cell with JSON and for each edge node, and no other."""
+        wanted: dict[BrokerSettings, list[MqttLink]] = {}
+        for link in links:
+            assert isinstance(link, MqttLink)
+            wanted.setdefault(link.plan.broker, []).append(link)
+        for settings, session in list(self._sessions.items()):
+            if not session.goes_on(wanted.get(settings, ())):
+                del self._sessions[settings]
                 self._end(session)
-        for link in wanted:
-            if link not in self._sessions:
-                session = BrokerSession(link.plan.broker, link)
-                session.trace(self._tap)
-                link.session = session
-                self._sessions[link] = session
-                self._begin(session)
+        for settings, members in wanted.items():
+            known = self._sessions.get(settings)
+            if known is None:
+                self._sessions[settings] = known = self._session(settings, members)
+                self._begin(known)
+            known.speaker.serve(members, clock.now())
+
+    def _session(self, settings: BrokerSettings, links: Sequence[MqttLink]) -> BrokerSession:
+        first = links[0]
+        if isinstance(first, JsonLink):
+            session = BrokerSession(settings, first)
+        else:
+            # See MqttRuntime.make.
+            from gatewayd.links.mqtt.node import SparkplugNode  # noqa: PLC0415
+
+            session = BrokerSession(settings, SparkplugNode(links, self.state))
+        session.trace(self._tap)
+        session.speaker.attach(session)
+        return session
 
     async def close(self) -> None:
         """Say good-bye to all."""

@@ -82,6 +82,9 @@ class _Visit:
             with suppress(asyncio.CancelledError):
                 await work
 
+    async def preparing(self) -> None:
+        """Nothing has to be kept."""
+
     def will(self) -> Message | None:
         """None: a visitor leaves nothing."""
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from gatewayd.core.cell import Cell
 from gatewayd.links.contract import Context, LinkRuntime
 from gatewayd.links.mqtt.brokers import Brokers
+from gatewayd.links.mqtt.json_link import JsonLink
 from gatewayd.links.mqtt.link import MqttLink
 from gatewayd.links.mqtt.plan import MqttPlan
 from gatewayd.mapping.plan import LinkPlan
@@ -20,7 +21,14 @@ class MqttRuntime(LinkRuntime):
     def make(self, plan: LinkPlan, cell: Cell, context: Context) -> MqttLink:
         """A link; `Brokers.serve` has a connection for it."""
         assert isinstance(plan, MqttPlan)
-        return MqttLink(plan, cell)
+        if plan.sparkplug is None:
+            return JsonLink(plan, cell)
+        # Most cells with a broker need none of it.
+        from gatewayd.links.mqtt.sparkplug_link import SparkplugLink  # noqa: PLC0415
+
+        assert isinstance(context.shared, Brokers)
+        context.shared.state = context.state
+        return SparkplugLink(plan, cell)
 
 
 RUNTIME = MqttRuntime()

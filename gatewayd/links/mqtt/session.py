@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from gatewayd.links.contract import Passage, Tap
 from gatewayd.logs.records import fields
@@ -15,6 +15,9 @@ from gatewayd.mqtt.client import MqttClient
 from gatewayd.mqtt.messages import BrokerSettings, Message, Received
 from gatewayd.mqtt.packets import Oversized
 from gatewayd.report.format import address
+
+if TYPE_CHECKING:
+    from gatewayd.links.mqtt.link import MqttLink
 
 LOSS_INTERVAL = 60.0
 """Seconds after which a connection that still fails for the same reason is logged again."""
@@ -28,6 +31,18 @@ log = logging.getLogger("gatewayd.mqtt")
 
 class Speaker(Protocol):
     """Who says values by a connection and hears commands. Nothing of it may raise."""
+
+    def attach(self, session: BrokerSession) -> None:
+        """Speak by this session."""
+
+    def serve(self, links: Sequence[MqttLink], now: float) -> None:
+        """Speak for these cells from now on."""
+
+    def goes_on(self, links: Sequence[MqttLink]) -> bool:
+        """Whether it can speak for these."""
+
+    async def preparing(self) -> None:
+        """A connection is about to be begun."""
 
     def will(self) -> Message | None:
         """What the broker says when the connection ends without a word."""
@@ -47,7 +62,7 @@ class Speaker(Protocol):
     def tick(self, now: float) -> None:
         """Say what is due."""
 
-    def leave(self, now: float) -> None:
+    def farewell(self, now: float) -> None:
         """Say good-bye: the connection ends now, and on purpose."""
 
 
@@ -71,6 +86,10 @@ class BrokerSession:
         """Moves while the session is at work."""
         return self.client.progress + self._rests
 
+    def goes_on(self, links: Sequence[MqttLink]) -> bool:
+        """Whether the connection goes on for these cells."""
+        return self.speaker.goes_on(links)
+
     async def run(self) -> None:
         """Keep at work until cancelled, whatever happens."""
         await keep_running(self._work, log, RETRY_PERIOD, self._rest)
@@ -78,7 +97,7 @@ class BrokerSession:
     async def close(self) -> None:
         """Say good-bye and end."""
         if self.client.is_connected:
-            self.speaker.leave(clock.now())
+            self.speaker.farewell(clock.now())
             await self.client.leave()
         if self.task is not None:
             self.task.cancel()
@@ -97,6 +116,10 @@ class BrokerSession:
         self.client.tap = passed
 
     # -- called by the client ----------------------------------------------------------------------------------------
+
+    async def preparing(self) -> None:
+        """See ClientUser."""
+        await self.speaker.preparing()
 
     def will(self) -> Message | None:
         """See ClientUser."""

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import Event, EventKind
-from gatewayd.links.mqtt.link import MqttLink
+from gatewayd.links.mqtt.json_link import JsonLink
 from gatewayd.links.mqtt.plan import MqttPlan
 from gatewayd.links.mqtt.session import BrokerSession
 from gatewayd.mapping.loader import Loaded, load
@@ -66,6 +66,9 @@ class FakeClient:
     def subscribe(self, topics: Sequence[str], qos: int = 0) -> None:
         self.topics += topics
 
+    def reconnect(self, reason: str) -> None:
+        self.is_connected = self.writable = False
+
     def unsubscribe(self, topics: Sequence[str]) -> None:
         self.topics = [topic for topic in self.topics if topic not in topics]
 
@@ -86,7 +89,7 @@ class Rig:
         plan = planned(broker, variables)
         self.now = NOW
         self.cell = Cell(plan.cell)
-        self.link = MqttLink(plan.the(MqttPlan), self.cell, lambda: self.now + AHEAD)
+        self.link = JsonLink(plan.the(MqttPlan), self.cell, lambda: self.now + AHEAD)
         self.client = FakeClient()
         self.session = FakeSession(self.client)
         self.link.session = cast("BrokerSession", self.session)
@@ -94,7 +97,6 @@ class Rig:
         self.cell.adopt({index: variable.kind.zero for index, variable in self.inputs()}, self.now)
         self.package()
 
-    @property
     def owner_of_flag(self) -> int | None:
         return self.cell.ownership.owners[1]
 

@@ -18,9 +18,12 @@ from gatewayd.mapping.rules.writers import ways_of
 @cell_rule("GW869")
 def command_topic_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Two writers that command by the same topic."""
+    section = section_of(cell.document)
+    is_sparkplug = section is not None and section.spec.sparkplug is not None
     known: dict[str, Part[WriterSpec]] = {}
     for _index, part, name in writers_of(cell.document):
-        other = known.setdefault(name, part)
+        # By Sparkplug all commands for a device have one topic, whichever host sends them.
+        other = known.setdefault("" if is_sparkplug else name, part)
         if other is not part:
             message = f"`{part.name}` commands by `{name}`, and so does `{other.name}`"
             related = (Related(other.at("mqtt"), f"`{other.name}` is here"),)

@@ -190,16 +190,16 @@ def test_writers_are_lost_with_the_broker_and_by_their_silence() -> None:
     rig.connect()
     rig.command({"write": {"flag": True}})
     rig.lose()
-    assert rig.owner_of_flag is None
+    assert rig.owner_of_flag() is None
     assert not rig.cell.image.values[FLAG], "on_release"
     rig.connect()
     rig.command({"write": {"flag": True}})
     for _ in range(3):
         rig.after(0.9)
         rig.command({})
-    assert rig.owner_of_flag == CLOUD, "a sign of life is enough"
+    assert rig.owner_of_flag() == CLOUD, "a sign of life is enough"
     rig.after(2.5)
-    assert rig.owner_of_flag is None
+    assert rig.owner_of_flag() is None
 
 
 def test_an_answer_that_the_broker_does_not_take_is_counted() -> None:
