@@ -19,6 +19,7 @@ from typing import Final
 from gatewayd.core.cell import Cell
 from gatewayd.core.refusal import Refusal
 from gatewayd.core.unserved import Unserved
+from gatewayd.links.contract import Link
 from gatewayd.links.mqtt.link import MqttLink
 from gatewayd.links.mqtt.payload import CellCommand, CommandError, decode_command, encode, value_fields
 from gatewayd.links.mqtt.plan import AVAILABLE, HISTORY, RESULT, MqttPlan
@@ -69,10 +70,10 @@ class JsonLink(MqttLink):
         """By a session of its own."""
         self.session = session
 
-    def serve(self, links: Sequence[MqttLink], now: float) -> None:
+    def serve(self, links: Sequence[Link], now: float) -> None:
         """For itself alone."""
 
-    def goes_on(self, links: Sequence[MqttLink]) -> bool:
+    def goes_on(self, links: Sequence[Link]) -> bool:
         """While it is there."""
         return list(links) == [self]
 

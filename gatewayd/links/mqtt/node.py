@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+from gatewayd.links.contract import Link
 from gatewayd.links.mqtt.bd_seq import bd_seq_file, read_bd_seq, write_bd_seq
 from gatewayd.links.mqtt.commands import MAX_BURST, MAX_RATE
-from gatewayd.links.mqtt.link import MqttLink
 from gatewayd.links.mqtt.session import BrokerSession
 from gatewayd.links.mqtt.sparkplug_link import SparkplugLink
 from gatewayd.logs.records import fields
@@ -35,22 +35,21 @@ log = logging.getLogger("gatewayd.mqtt")
 class SparkplugNode:
     """Speaks by a session, and is what the edge node calls."""
 
-    def __init__(self, links: Sequence[MqttLink], state: Path, wall: Callable[[], float] = time.time) -> None:
+    def __init__(self, links: Sequence[Link], state: Path, wall: Callable[[], float] = time.time) -> None:
         plan = links[0].plan
         assert plan.sparkplug is not None
         self.session: BrokerSession | None = None
         self._links = _by_device(links)
         self._wall = wall
-        self._file = bd_seq_file(state, plan.sparkplug.group, plan.sparkplug.node)
+        self._file = bd_seq_file(state, sparkplug.group, sparkplug.node)
         self._will: Message | None = None
         self._now = self._waited = 0.0
         """Of the message that is served now."""
         self._allowance = Allowance(MAX_BURST, MAX_RATE)
-        kept = [link.plan for link in links if link.plan.keep is not None]
+        kept = [plan for plan in plans if plan.keep is not None]
         limits = HistoryLimits(
             size=sum(each.size for each in kept), age=max((each.keep or 0.0 for each in kept), default=0.0)
         )
-        sparkplug = plan.sparkplug
         self.node = EdgeNode(
             EdgeNodeSettings(sparkplug.group, sparkplug.node, sparkplug.primary_host, history=limits),
             self,
@@ -63,11 +62,11 @@ class SparkplugNode:
         """See Speaker."""
         self.session = session
 
-    def goes_on(self, links: Sequence[MqttLink]) -> bool:
+    def goes_on(self, links: Sequence[Link]) -> bool:
         """While there is a device."""
         return bool(links)
 
-    def serve(self, links: Sequence[MqttLink], now: float) -> None:
+    def serve(self, links: Sequence[Link], now: float) -> None:
         """Devices are these from now on."""
         self._links = _by_device(links)
         for link in links:
@@ -209,5 +208,5 @@ class SparkplugNode:
         return round((self._wall() - clock.now() + moment) * 1000)
 
 
-def _by_device(links: Sequence[MqttLink]) -> dict[str, SparkplugLink]:
+def _by_device(links: Sequence[Link]) -> dict[str, SparkplugLink]:
     return {link.device: link for link in links if isinstance(link, SparkplugLink)}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
-from gatewayd.links.contract import Passage, Tap
+from gatewayd.links.contract import Link, Passage, Tap
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.loop.retry import keep_running
@@ -15,9 +15,6 @@ from gatewayd.mqtt.client import MqttClient
 from gatewayd.mqtt.messages import BrokerSettings, Message, Received
 from gatewayd.mqtt.packets import Oversized
 from gatewayd.report.format import address
-
-if TYPE_CHECKING:
-    from gatewayd.links.mqtt.link import MqttLink
 
 LOSS_INTERVAL = 60.0
 """Seconds after which a connection that still fails for the same reason is logged again."""
@@ -35,10 +32,10 @@ class Speaker(Protocol):
     def attach(self, session: BrokerSession) -> None:
         """Speak by this session."""
 
-    def serve(self, links: Sequence[MqttLink], now: float) -> None:
+    def serve(self, links: Sequence[Link], now: float) -> None:
         """Speak for these cells from now on."""
 
-    def goes_on(self, links: Sequence[MqttLink]) -> bool:
+    def goes_on(self, links: Sequence[Link]) -> bool:
         """Whether it can speak for these."""
 
     async def preparing(self) -> None:
@@ -86,7 +83,7 @@ class BrokerSession:
         """Moves while the session is at work."""
         return self.client.progress + self._rests
 
-    def goes_on(self, links: Sequence[MqttLink]) -> bool:
+    def goes_on(self, links: Sequence[Link]) -> bool:
         """Whether the connection goes on for these cells."""
         return self.speaker.goes_on(links)
 
