@@ -17,6 +17,7 @@ SUBJECTS = {
     "latency": "robot to PLC and PLC to robot, as histograms, beside a gateway in C",
     "cost": "CPU time and memory of the daemon with the full image at 500 Hz, beside a gateway in C",
     "packages": "packages of the robot that were not shown, one by one and in bursts",
+    "fleet": "a process for each cell, a thousand edge nodes at one broker, and a broker that is away for an hour",
     "growth": "cells, connections and variables: what each of them adds, and where that ends",
     "canopen": "CPU per PDO, a saturated bus and SYNC, beside python-canopen's own node",
     "rtde": "RTDE clients: CPU per package, recordings, a control loop, beside ur_rtde and the official style",
