@@ -36,8 +36,9 @@ class SparkplugNode:
     """Speaks by a session, and is what the edge node calls."""
 
     def __init__(self, links: Sequence[Link], state: Path, wall: Callable[[], float] = time.time) -> None:
-        plan = links[0].plan
-        assert plan.sparkplug is not None
+        plans = [link.plan for link in links if isinstance(link.plan, MqttPlan)]
+        sparkplug = plans[0].sparkplug
+        assert sparkplug is not None
         self.session: BrokerSession | None = None
         self._links = _by_device(links)
         self._wall = wall
@@ -69,7 +70,7 @@ class SparkplugNode:
     def serve(self, links: Sequence[Link], now: float) -> None:
         """Devices are these from now on."""
         self._links = _by_device(links)
-        for link in links:
+        for link in self._links.values():
             link.session = self.session
         self.node.redeclare((), [link.declaration() for link in self._links.values()], now)
         self._say(now)
