@@ -25,7 +25,7 @@ PERIOD = 10.0
 OF_ONE_TEXT = 300
 """Lines of one event, whatever it is about, that are written one by one; then one a second."""
 _LOOK = 1.0
-_VOLATILE = frozenset({"old", "new", "repeats", "detail", "text", "path", "time"})
+_VOLATILE = frozenset({"old", "new", "repeats", "detail", "text", "path", "bus_time"})
 """Fields in which lines about the same thing differ."""
 _NUMBER = re.compile(r"\d+")
 
