@@ -132,7 +132,6 @@ LAYERS: dict[str, set[str]] = {
         "report.printable",
         "report.wording",
     },
-    "links.mqtt": {*LINK, "links.mqtt", "mqtt", "sparkplug"},
     "links.standby": {*LINK, "links.standby"},
     "links.mqtt": {*LINK, "links.mqtt", "mqtt", "sparkplug", "whole_file"},
     "report": {"core", "links.contract", "links.registry", "mapping", "report"},

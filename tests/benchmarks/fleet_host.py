@@ -14,10 +14,9 @@ import time
 from collections import Counter
 
 from gatewayd.links.mqtt.session import BrokerSession
+from gatewayd.loop.clock import ClockedLoop
 from gatewayd.mqtt.messages import BrokerSettings, Message, Received
 from gatewayd.mqtt.packets import Oversized
-
-from gatewayd.loop.clock import ClockedLoop
 from gatewayd.sparkplug.datatypes import MetricType, encode_value
 from gatewayd.sparkplug.declarations import REBIRTH
 from gatewayd.sparkplug.payload import Metric, Payload, decode_payload, encode_payload

@@ -18,11 +18,10 @@ import time
 import gatewayd.links.mqtt.session as link_session
 import gatewayd.mqtt.client as mqtt_client
 from gatewayd.links.mqtt.session import BrokerSession
-from gatewayd.mqtt.messages import BrokerSettings, Message, Received
-from gatewayd.mqtt.packets import Oversized
-
 from gatewayd.loop import clock
 from gatewayd.loop.clock import ClockedLoop
+from gatewayd.mqtt.messages import BrokerSettings, Message, Received
+from gatewayd.mqtt.packets import Oversized
 from gatewayd.sparkplug.actions import CommandReceived, CommandRefused, SparkplugMessage
 from gatewayd.sparkplug.datatypes import MetricType
 from gatewayd.sparkplug.declarations import DeviceDeclaration, MetricDeclaration, MetricValue

@@ -15,6 +15,7 @@ from pathlib import Path
 from gatewayd.links.contract import Link
 from gatewayd.links.mqtt.bd_seq import bd_seq_file, read_bd_seq, write_bd_seq
 from gatewayd.links.mqtt.commands import MAX_BURST, MAX_RATE
+from gatewayd.links.mqtt.plan import MqttPlan
 from gatewayd.links.mqtt.session import BrokerSession
 from gatewayd.links.mqtt.sparkplug_link import SparkplugLink
 from gatewayd.logs.records import fields
