@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -34,12 +36,12 @@ PATIENCE = 180.0
 QUIET = BrokerOptions(more=("log_dest none", "max_queued_messages 0"))
 """No log, and nothing of QoS 0 is dropped for a host that is slow for a moment."""
 MQTT = """\
-mqtt: {{host: {host}, port: {port}, topic: bench/{number}}}
+mqtt: {{host: {host}, port: {port}, sparkplug: {{group: bench, node: gateway-{number}}}}}
 """
 
 OF_PROCESSES = f"""\
 One gatewayd for each cell, with the full image, a robot at {FREQUENCY} Hz, and all values that change once a second to
-one mosquitto, as JSON. Robots are one process, whose CPU time is not counted. {RULE}"""
+one mosquitto, by Sparkplug. Robots are one process, whose CPU time is not counted. {RULE}"""
 OF_NODES = f"""\
 {NODES:,} edge nodes without robots in one process, each with its own connection to one mosquitto, one device and
 {METRICS + 1} metrics that all change once a second (one DDATA). A host application hears and decodes everything. Time
@@ -52,7 +54,9 @@ nodes' attempts are as far apart as they will ever be; meanwhile the clocks of t
 
 
 def run(job: Job) -> list[Table]:
-    """Three tables."""
+    """Three tables, where mosquitto is installed."""
+    if shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin") is None:
+        return [Table("Fleet", "mosquitto is not installed (Debian package mosquitto): not measured", ("",))]
     samples = Samples()
     return [_processes(job, samples), *_nodes(job, samples)]
 
