@@ -46,13 +46,22 @@ def compile_libmodbus_server(folder: Path) -> str:
 
 def go_server(folder: Path) -> str:
     """The program, compiled into the folder."""
+    return _go_program("go_server", folder)
+
+
+def go_client(folder: Path) -> str:
+    """The client with TLS, compiled into the folder."""
+    return _go_program("go_client", folder)
+
+
+def _go_program(name: str, folder: Path) -> str:
     go = shutil.which("go")
     if go is None:
         pytest.skip("no Go compiler")
-    program = folder / "go_server"
+    program = folder / name
     built = subprocess.run(
         [go, "build", "-o", program, "."],
-        cwd=_HERE / "go_server",
+        cwd=_HERE / name,
         env={**os.environ, "GOTOOLCHAIN": "local"},
         capture_output=True,
         text=True,

@@ -1,0 +1,40 @@
+"""Every command of docs/howto/secure-modbus.md, in its order; and what they make is good for a listener."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from gatewayd.links.modbus_server.plan import TrustFiles
+from gatewayd.links.modbus_server.role import role_of
+from gatewayd.links.modbus_server.trust import load
+from gatewayd.links.modbus_server.trust_findings import findings
+from gatewayd.machine.x509 import from_pem
+from tests.sources import ROOT
+
+PAGE = (ROOT / "docs" / "howto" / "secure-modbus.md").read_text()
+COMMANDS = re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no program openssl")
+def test_the_recipe(tmp_path: Path) -> None:
+    etc = tmp_path / "etc"
+    # Another folder than the system's, and no group that only the package makes.
+    script = "\n".join(COMMANDS).replace("/etc/gatewayd", str(etc)).replace(" -g gatewayd", "")
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "subject=CN = plc-press-3" in done.stdout
+    tls = etc / "tls"
+    names = ("cell.crt", "cell.key", "clients.crt", "revoked.crl")
+    files = TrustFiles(*(str(tls / name) for name in names))
+    assert list(findings(files, time.time())) == []
+    (client,) = from_pem((tmp_path / "commissioning" / "plc.crt").read_bytes())
+    assert role_of(client) == "Operator"
+    assert load(files).facts.revoked == {client.serial}
