@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from gatewayd.links.modbus_server.plan import TrustFiles
 from gatewayd.links.modbus_server.trust import FileFacts, TrustError, load, look
 
-SOON = 30 * 86400.0
-"""Seconds before an expiry from which on it is told."""
 _DAY = 86400.0
+SOON = {"certificate": 30 * _DAY, "clients": 30 * _DAY, "revoked": 7 * _DAY}
+"""Seconds before an expiry from which on it is told. Many authorities issue a revocation list each month."""
 _WHAT = {
     "certificate": ("the gateway's certificate", "clients refuse the gateway", "renew it"),
     "clients": (
@@ -72,7 +72,7 @@ def expiring(facts: FileFacts, now: float) -> Iterator[TrustFinding]:
         what, effect, remedy = _WHAT[key]
         if at <= now:
             yield TrustFinding(key, f"has expired: {what}, on {_day(at)}; {effect}", remedy, unusable=True)
-        elif at - now < SOON:
+        elif at - now < SOON[key]:
             days = int((at - now) // _DAY)
             yield TrustFinding(
                 key, f"expires in {days} days: {what}, on {_day(at)}; from then on {effect}", remedy
