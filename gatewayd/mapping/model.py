@@ -89,6 +89,10 @@ class VariablePolicy(Section):
 class VariableSpec(VariablePolicy):
     """One variable, or a family of variables on one line."""
 
-    deadband: Real = Field(default=0.0, ge=0, description="least change that makes an event-driven PDO send")
+    deadband: Real = Field(
+        default=0.0,
+        ge=0,
+        description="least change of a real that makes an event-driven PDO or a message by MQTT send",
+    )
     unit: str = Field(default="", max_length=32, description="unit of the robot's value, for people")
     comment: str = Field(default="", max_length=500, description="for people")

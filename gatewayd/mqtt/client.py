@@ -34,7 +34,7 @@ CONNECT_WITHIN = 5.0
 """Seconds for each step: look-up, connection with TLS, the broker's answer."""
 _LEAVE_WITHIN = 1.0
 _CONNECTION = "gatewayd.mqtt.connection"
-NOT_INSTALLED = "paho-mqtt is not installed: pip install 'gatewayd[mqtt]', or apt install python3-paho-mqtt"
+NOT_INSTALLED = "paho-mqtt is not installed: pip install 'gatewayd[mqtt]'"
 
 
 class NotInstalledError(OSError):
