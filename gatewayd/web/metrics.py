@@ -275,7 +275,7 @@ def _of_access(access: AccessControl) -> _SamplesOf:
     found: _SamplesOf = defaultdict(dict)
     found["gatewayd_listener_refusals_total"] = {(reason,): count for reason, count in access.refused.items()}
     if access.credentials is not None:
-        ends = {(token.name,): token.expires for token in access.credentials.tokens.tokens}
+        ends: _Samples = {(token.name,): token.expires for token in access.credentials.tokens.tokens}
         found["gatewayd_token_expiry_timestamp_seconds"] = ends
     if access.identity is not None and access.identity.chain:
         end = access.identity.chain[0].not_after
