@@ -21,12 +21,12 @@ from gatewayd.sparkplug.datatypes import MetricType, encode_value
 from gatewayd.sparkplug.declarations import REBIRTH
 from gatewayd.sparkplug.payload import Metric, Payload, decode_payload, encode_payload
 from gatewayd.sparkplug.topics import MessageType, SparkplugTopic, parse_topic
-from tests.benchmarks.fleet_nodes import GROUP, HOST
+from tests.benchmarks.fleet_nodes import GROUP, HOST, WithoutCells
 
 ALL = f"spBv1.0/{GROUP}/#"
 
 
-class Host:
+class Host(WithoutCells):
     """A Speaker that listens."""
 
     def __init__(self, host: str, port: int) -> None:
@@ -98,7 +98,7 @@ class Host:
     def tick(self, now: float) -> None:
         """Nothing is due."""
 
-    def leave(self, now: float) -> None:
+    def farewell(self, now: float) -> None:
         """It goes."""
 
     # -- commands ----------------------------------------------------------------------------------------------------

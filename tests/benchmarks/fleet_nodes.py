@@ -14,9 +14,11 @@ import json
 import logging
 import sys
 import time
+from collections.abc import Sequence
 
 import gatewayd.links.mqtt.session as link_session
 import gatewayd.mqtt.client as mqtt_client
+from gatewayd.links.contract import Link
 from gatewayd.links.mqtt.session import BrokerSession
 from gatewayd.loop import clock
 from gatewayd.loop.clock import ClockedLoop
@@ -98,7 +100,23 @@ class Node:
         self.session.client.reconnect(reason)
 
 
-class Speech:
+class WithoutCells:
+    """What a Speaker is asked about cells, for one that has none."""
+
+    def attach(self, session: BrokerSession) -> None:
+        """It knows its session."""
+
+    def serve(self, links: Sequence[Link], now: float) -> None:
+        """There are none."""
+
+    def goes_on(self, links: Sequence[Link]) -> bool:
+        return True
+
+    async def preparing(self) -> None:
+        """Nothing is kept on a disk."""
+
+
+class Speech(WithoutCells):
     """What the session of a node calls."""
 
     def __init__(self, node: Node) -> None:
@@ -127,7 +145,7 @@ class Speech:
     def tick(self, now: float) -> None:
         self._node.edge.tick(self._node.now())
 
-    def leave(self, now: float) -> None:
+    def farewell(self, now: float) -> None:
         self._node.edge.close(self._node.now())
 
 
