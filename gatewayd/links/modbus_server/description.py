@@ -44,9 +44,16 @@ def description(plan: ModbusPlan, cell: CellDefinition) -> Description:
         },
         places=places,
         writers={writer: ", ".join(its) for writer, its in networks.items()},
-        address=f"{listen} unit {plan.unit}",
+        address=f"{listen}{beside(plan)} unit {plan.unit}",
         fields={"listen": listen, "unit": plan.unit},
     )
+
+
+def beside(plan: ModbusPlan) -> str:
+    """The listener with TLS, where there is one."""
+    if plan.tls is None:
+        return ""
+    return f" and {address(plan.tls.host, plan.tls.port)} with TLS" if plan.plain else " with TLS"
 
 
 def _secured(tls: SecuredPlan, cell: CellDefinition) -> dict[str, str]:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import errno
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gatewayd.links.examination import Observation, Outcome
 from gatewayd.report.format import address, counted
 
-ADDRESS, PORT, PRIVILEGE = "address", "port", "privilege"
+if TYPE_CHECKING:
+    from gatewayd.links.modbus_server.trust_findings import TrustFinding
+
+ADDRESS, PORT, PRIVILEGE, FILES = "address", "port", "privilege", "certificates"
 _UNSEEN = "a process of another user (`sudo ss -ltnp` names it)"
 
 
@@ -65,6 +68,18 @@ def of_client(found: Observation, name: str, where: str) -> Observation:
     """The way to a declared writer; one that has none can connect all the same, if its own packages arrive."""
     outcome = Outcome.WARNING if found.outcome is Outcome.PROBLEM else found.outcome
     return replace(found, check=f"way to {name}", outcome=outcome, text=f"{where}: {found.text}")
+
+
+def of_file(path: str, finding: TrustFinding) -> Observation:
+    """Something that is wrong with a file of a listener with TLS."""
+    outcome = Outcome.PROBLEM if finding.unusable else Outcome.WARNING
+    cause = "clients with TLS are not served" if finding.unusable else "clients with TLS are served meanwhile"
+    return Observation(FILES, outcome, f"{path} {finding.text}", cause, finding.remedy)
+
+
+def files_well(paths: str) -> Observation:
+    """They are as they must be."""
+    return Observation.well(FILES, f"{paths}: in order")
 
 
 def _no_address(host: str, failure: OSError) -> Observation:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import time
 from collections.abc import AsyncIterator, Iterator
 from functools import partial
 
@@ -11,7 +12,7 @@ from gatewayd.core.definition import CellDefinition
 from gatewayd.links.examination import Examination, Observation, Surroundings
 from gatewayd.links.modbus_server import diagnosis
 from gatewayd.links.modbus_server.declaration import KIND
-from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, TrustFiles
 from gatewayd.links.route import look_up_route
 from gatewayd.loop.threads import in_daemon_thread
 from gatewayd.machine.ports import bind_failure, holder, listening_inodes
@@ -31,33 +32,53 @@ class ModbusExamination(Examination):
     ) -> AsyncIterator[Observation]:
         """See Examination."""
         assert isinstance(plan, ModbusPlan)
-        where = address(plan.host, plan.port)
-        served = [
-            link
-            for known in around.running
-            for link in known.links(KIND.title)
-            if link.get("listen") == where
-        ]
-        if served:
-            yield diagnosis.served(where, served)
-        else:
-            attempt = partial(bind_failure, plan.host, plan.port)
-            try:
-                async with asyncio.timeout(_PATIENCE):
-                    failure = await in_daemon_thread(attempt, f"bind {where}")
-            except TimeoutError as error:
-                failure = error
-            facts = diagnosis.PortFacts(
-                first_unprivileged_port(),
-                has_capability(NET_BIND_SERVICE),
-                holder(plan.port),
-                os.geteuid(),
-                listened=any(listening_inodes(plan.port)),
-            )
-            for found in diagnosis.listener(plan.host, plan.port, failure, facts):
+        for host, port in plan.endpoints:
+            async for found in _listener(host, port, around):
+                yield found
+        if plan.tls is not None:
+            for found in await in_daemon_thread(partial(_files, plan.tls.files), "certificates"):
                 yield found
         for found in _clients(plan, cell):
             yield found
+
+
+async def _listener(host: str, port: int, around: Surroundings) -> AsyncIterator[Observation]:
+    """One address: whether the gateway has it, or could."""
+    where = address(host, port)
+    served = [
+        link
+        for known in around.running
+        for link in known.links(KIND.title)
+        if where in (link.get("listen"), (link.get("tls") or {}).get("listen"))
+    ]
+    if served:
+        yield diagnosis.served(where, served)
+    else:
+        attempt = partial(bind_failure, host, port)
+        try:
+            async with asyncio.timeout(_PATIENCE):
+                failure = await in_daemon_thread(attempt, f"bind {where}")
+        except TimeoutError as error:
+            failure = error
+        facts = diagnosis.PortFacts(
+            first_unprivileged_port(),
+            has_capability(NET_BIND_SERVICE),
+            holder(port),
+            os.geteuid(),
+            listened=any(listening_inodes(port)),
+        )
+        for found in diagnosis.listener(host, port, failure, facts):
+            yield found
+
+
+def _files(files: TrustFiles) -> list[Observation]:
+    """The files of a listener with TLS, as this user can read them."""
+    from gatewayd.links.modbus_server.trust import paths_of  # noqa: PLC0415 - where a unit has TLS
+    from gatewayd.links.modbus_server.trust_findings import findings  # noqa: PLC0415
+
+    paths = paths_of(files)
+    found = [diagnosis.of_file(paths[its.key], its) for its in findings(files, time.time())]
+    return found or [diagnosis.files_well(", ".join(paths.values()))]
 
 
 def _clients(plan: ModbusPlan, cell: CellDefinition) -> Iterator[Observation]:

@@ -8,6 +8,7 @@ from typing import Final
 from gatewayd.links.modbus_places.located import part_text
 from gatewayd.links.modbus_places.placing import ExpandedPlacement
 from gatewayd.links.modbus_server.declaration import KIND
+from gatewayd.links.modbus_server.description import beside
 from gatewayd.links.modbus_server.expand import placements_of
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.tables import LinkTables
@@ -80,7 +81,7 @@ class ModbusTables(LinkTables):
     def headline(self, plan: Plan) -> str:
         """Listener and unit."""
         modbus = plan.the(ModbusPlan)
-        return f"Modbus TCP {address_text(modbus.host, modbus.port)} unit {modbus.unit}"
+        return f"Modbus TCP {address_text(modbus.host, modbus.port)}{beside(modbus)} unit {modbus.unit}"
 
     def introduction(self, plan: Plan) -> str:
         """Port and unit."""

@@ -15,6 +15,7 @@ from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 from tests.e2e.processes import HOST, free_port
+from tests.links.modbus_server.secured import Certificates
 
 MAPPING = """\
 gatewayd: 1
@@ -74,3 +75,15 @@ async def test_the_gateway_on_this_machine_has_the_port() -> None:
 async def test_an_address_of_another_machine() -> None:
     found = await look(plan_at("198.51.100.9", free_port()))
     assert (found[0].check, found[0].outcome) == ("address", Outcome.PROBLEM)
+
+
+async def test_files_of_a_listener_with_tls(certificates: Certificates) -> None:
+    tls = MAPPING.replace("modbus: {{listen: '{host}:{port}'}}", "modbus: {{tls: {tls}}}")
+    good = certificates.files(revoked=False)
+    for key, outcome in ((good.key, Outcome.OK), (str(certificates.viewer.key), Outcome.PROBLEM)):
+        files = f"certificate: {good.certificate}, key: {key}, clients: {good.clients}"
+        section = f"{{listen: '{HOST}:{free_port()}', {files}}}"
+        loaded = load(tls.format(tls=section).encode(), "a.yaml")
+        assert loaded.plan is not None, loaded.diagnostics
+        seen = [each for each in await look(loaded.plan) if each.check == "certificates"]
+        assert [each.outcome for each in seen] == [outcome]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 
 from gatewayd.core.cell import Cell
@@ -71,3 +73,14 @@ def test_it_is_the_unit_of_another_plan_and_cell_after_a_reload() -> None:
     unit.rebind(other, successor, 1.0)
     assert (unit.plan, unit.cell) == (other, successor)
     assert unit.health().figures["unit"] == 9
+
+
+def test_nothing_of_tls_is_loaded_where_no_listener_has_it() -> None:
+    """A daemon with plain Modbus pays nothing for it."""
+    program = (
+        "import sys; import gatewayd.links.modbus_server.runtime\n"
+        "print([name for name in sys.modules if name.rpartition('.')[2] in "
+        "('secure_connection', 'trust', 'trust_findings', 'renewal', 'x509', 'der')])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -15,6 +15,7 @@ import pytest
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
 from gatewayd.links.modbus_server import handshakes
+from gatewayd.links.modbus_server.link import ModbusUnit
 from gatewayd.links.modbus_server.listener import ModbusListener
 from gatewayd.links.modbus_server.peers import PeerEvent, PeerEventKind
 from gatewayd.links.modbus_server.plan import ModbusPlan
@@ -504,3 +505,32 @@ async def test_time_of_an_idle_connection_is_that_of_requests(
         begun = time.monotonic()
         assert await client.reader.read() == b""
         assert time.monotonic() - begun > 0.1
+
+
+# -- a reload -------------------------------------------------------------------------------------------------------
+
+
+async def test_a_right_that_goes_releases_what_is_owned_by_it(
+    listener: ModbusListener,
+    plan: ModbusPlan,
+    certificates: Certificates,
+    live_cell: Cell,
+    index_of: Callable[[str], int],
+) -> None:
+    """The reload says so before (`Link.departing`); the client stays connected, and is refused with 01 from then on."""
+    assert plan.tls is not None
+    unit = ModbusUnit(plan, live_cell)
+    unit.listeners.append(listener)
+    part, definition = index_of("part"), live_cell.definition
+    narrowed = replace(plan.tls.roles[0], writable=(index_of("start"),))
+    after = replace(plan, tls=replace(plan.tls, roles=(narrowed,)))
+    listener._host, listener._port = plan.tls.host, plan.tls.port
+    async with dialled(listener, client_context(certificates, certificates.operator)) as client:
+        assert await client.ask(WRITE) == WRITE
+        assert unit.departing(plan, definition) == {}
+        (why,) = unit.departing(after, definition).values()
+        assert why.startswith("role operator may not write ")
+        unit.release(after, definition, time.monotonic())
+        listener.serve([(after, live_cell)])
+        assert live_cell.ownership.owners[definition.variables[part].lock or 0] is None
+        assert await client.ask(WRITE) == ILLEGAL_WRITE
