@@ -41,7 +41,7 @@ _COUNTED = re.compile(r"counted\(|[A-Z_]+$|_HEADER\.size$")
 
 NEVER_ONE = {
     "canopen.manager.configuration: count": "more than the limit",
-    "links.devices.canopen.link: self.plan.name": "not a number",
+    "links.devices.link: self.plan.name": "not a number, and changes is a verb",
     "links.devices.rules.objects: bits": "more than 64",
     "links.devices.canopen.proposal: bits": "more than 64",
     "canopen.manager.pdo_content: shift": "more than 64",
@@ -53,11 +53,13 @@ NEVER_ONE = {
     "links.canopen_node.rules.pdos: pdo.bits": "more than 64",
     "links.devices.declaration: len(STATUS_WORDS)": "16 of them",
     "links.modbus_server.rules.places: limit": "the greatest block of a request",
+    "links.standby.sections: len(peers)": "more than two",
     "links.robot.rules.fields: size": "more than 2048",
     "links.robot.rules.fields: len(names)": "as many as take more than 2048 bytes",
     "links.mqtt.json_link: message.length": "more than is read",
     "links.mqtt.node: message.length": "more than is read",
     "links.mqtt.traffic: packet.length": "more than is read",
+    "machine.der: len(found)": "any number but one",
     "mqtt.names: len(topic)": "none, or longer than any topic may be",
     "mqtt.packets: length": "more than is read",
     "mqtt.words: len(data)": "more than is shown",
