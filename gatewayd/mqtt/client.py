@@ -67,6 +67,9 @@ class ClientUser(Protocol):
     def oversized(self, message: Oversized) -> None:
         """One came that was too large to be read."""
 
+    def flooded(self, count: int) -> None:
+        """So many messages were let pass unread, because more came than are read."""
+
     def subscription(self, topics: Sequence[str], why: str) -> None:
         """The broker sends these topics; or it does not, and why."""
 
@@ -171,6 +174,9 @@ class MqttClient:
         while not connection.lost.done():
             self._step()
             connection.tick()
+            unread = connection.take_unread()
+            if unread:
+                self._user.flooded(unread)
             await asyncio.wait((connection.lost,), timeout=STEP)
             steps += 1
             if steps * STEP > CONNECT_WITHIN:

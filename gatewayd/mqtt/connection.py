@@ -7,13 +7,17 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from gatewayd.loop import clock
+from gatewayd.loop.allowance import Allowance
 from gatewayd.mqtt.engine import Engine
 from gatewayd.mqtt.messages import BrokerSettings, Message, Received
 from gatewayd.mqtt.packets import MqttProtocolError, Oversized, PacketSplitter
 from gatewayd.mqtt.waiting import WaitedMessages
 
+_TYPE_AND_QOS, _PUBLISH = 0xF6, 0x30
 MAX_UNSENT = 65_536
 """Bytes that wait in us for a slow broker; beyond them nothing is given any more."""
+MAX_RATE = 200.0
+"""Messages with QoS 0 a second that are read; a burst of as many. What comes beyond costs a few microseconds each."""
 MAX_TURN = 16
 """Messages that are served before others have their turn: some 2 ms, if each of them is a command."""
 
@@ -40,6 +44,8 @@ class BrokerConnection(asyncio.Protocol):
         self._engine.message = self._message
         self._engine.subscribed = self._answered
         self._splitter = PacketSplitter()
+        self._allowance = Allowance(int(MAX_RATE), MAX_RATE)
+        self._unread = 0
         self._transport: asyncio.Transport | None = None
         self._waited = WaitedMessages()
         self._queue: deque[tuple[bytes | Oversized, float]] = deque()
@@ -71,10 +77,20 @@ class BrokerConnection(asyncio.Protocol):
         self._waited.read(len(data))
         waited = self._waited.seconds(now)
         try:
-            self._queue.extend((packet, waited) for packet in self._splitter.feed(data))
+            packets = self._splitter.feed(data)
         except MqttProtocolError as error:
             self.end(f"not MQTT: {error}")
             return
+        for packet in packets:
+            # One with QoS 1 has to be acknowledged; of these a broker has few under way.
+            if (
+                isinstance(packet, bytes)
+                and packet[0] & _TYPE_AND_QOS == _PUBLISH
+                and not self._allowance.take(now)
+            ):
+                self._unread += 1
+            else:
+                self._queue.append((packet, waited))
         self._serve()
         if self._queue and self._transport is not None and not self.lost.done():
             self._transport.pause_reading()
@@ -111,6 +127,11 @@ class BrokerConnection(asyncio.Protocol):
                 self._engine.tick()
             except TimeoutError as error:
                 self.end(str(error))
+
+    def take_unread(self) -> int:
+        """How many messages were let pass since the last call, because too many came."""
+        unread, self._unread = self._unread, 0
+        return unread
 
     def publish(self, message: Message) -> bool:
         """Send it now; False: it cannot be taken, and was not."""

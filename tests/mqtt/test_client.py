@@ -32,6 +32,7 @@ class User:
         self.losses: list[str] = []
         self.connections = 0
         self.attempts = 0
+        self.unread = 0
 
     async def preparing(self) -> None:
         self.attempts += 1
@@ -47,6 +48,9 @@ class User:
 
     def oversized(self, message: Oversized) -> None:
         self.large.append(message)
+
+    def flooded(self, count: int) -> None:
+        self.unread += count
 
     def subscription(self, topics: Sequence[str], why: str) -> None:
         self.answers.update(dict.fromkeys(topics, why))
@@ -106,6 +110,20 @@ async def test_a_huge_message_costs_neither_memory_nor_the_connection(tmp_path: 
             publish(broker, "a", "after")
             await until(lambda: user.heard == [Received("a", b"after")], "the next one")
             assert user.large == ([] if version == MQTT_5 else [Oversized("a", 3_000_003)])
+            assert not user.losses
+
+
+async def test_of_a_flood_no_more_is_read_than_can_be_served(tmp_path: Path) -> None:
+    (tmp_path / "lines").write_text("x\n" * 3000)
+    with mosquitto(tmp_path / "broker", BrokerOptions(more=("max_queued_messages 10000",))) as broker:
+        async with at_work(settings_of(broker)) as (client, user):
+            await until(lambda: client.is_connected, "a connection")
+            client.subscribe(["a"])
+            await until(lambda: "a" in user.answers, "a subscription")
+            where = f"-h {HOST} -p {broker.port} -t a -l"
+            run("sh", "-c", f"mosquitto_pub {where} < lines", cwd=tmp_path)
+            await until(lambda: len(user.heard) + user.unread == 3000, "all of them")
+            assert user.unread > 1000
             assert not user.losses
 
 

@@ -91,6 +91,13 @@ class CommandDesk:
         self.refused[reason.name.lower()] += 1
         self._cell.unserved(self._requesters[known], reason, request, now)
 
+    def flooded(self, count: int, now: float) -> None:
+        """Commands of nobody knows whom were not even read."""
+        self.refused[Unserved.NOT_ALLOWED.name.lower()] += count
+        for requester in self._requesters.values():
+            text = "more commands than are read"
+            self._cell.unserved(requester, Unserved.NOT_ALLOWED, text, now)
+
     def write(
         self, known: str, wanted: Mapping[str, object], waited: float, now: float
     ) -> tuple[Refusal | None, Sequence[int]]:

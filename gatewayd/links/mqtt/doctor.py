@@ -105,6 +105,9 @@ class _Visit:
     def received(self, message: Received) -> None:
         """Nothing is done with it."""
 
+    def flooded(self, count: int) -> None:
+        """Nothing is done about it."""
+
     def oversized(self, message: Oversized) -> None:
         """Nothing is done with it."""
 

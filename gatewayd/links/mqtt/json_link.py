@@ -130,6 +130,10 @@ class JsonLink(MqttLink):
             self.desk.ignore(known, Unserved.MALFORMED, text, now)
             self._answer(known, None, {"result": "refused", "reason": "malformed", "text": text})
 
+    def flooded(self, count: int, now: float) -> None:
+        """Too many commands."""
+        self.desk.flooded(count, now)
+
     def received(self, message: Received, now: float) -> None:
         """A command, or what claims to be one."""
         known = self._writer_of(message.topic)

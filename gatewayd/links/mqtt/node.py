@@ -114,6 +114,11 @@ class SparkplugNode:
         """See Speaker."""
         self._device_ignores(message.topic, f"{message.length} bytes are too many for a command", now)
 
+    def flooded(self, count: int, now: float) -> None:
+        """See Speaker. Nobody knows which device was meant."""
+        for link in self._links.values():
+            link.desk.flooded(count, now)
+
     def lost(self, reason: str, now: float) -> None:
         """See Speaker."""
         self._now = now

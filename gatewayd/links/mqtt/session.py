@@ -53,6 +53,9 @@ class Speaker(Protocol):
     def oversized(self, message: Oversized, now: float) -> None:
         """One came that was too large."""
 
+    def flooded(self, count: int, now: float) -> None:
+        """So many messages were not read."""
+
     def lost(self, reason: str, now: float) -> None:
         """The broker is gone."""
 
@@ -136,6 +139,10 @@ class BrokerSession:
     def oversized(self, message: Oversized) -> None:
         """See ClientUser."""
         self.speaker.oversized(message, clock.now())
+
+    def flooded(self, count: int) -> None:
+        """See ClientUser."""
+        self.speaker.flooded(count, clock.now())
 
     def subscription(self, topics: Sequence[str], why: str) -> None:
         """See ClientUser."""
