@@ -101,7 +101,8 @@ class Faults:
     linger: float = 0.0
     """How long claims outlive their connection."""
     overflow_close: float | None = 1.0
-    """Close a client that has not read for this long once its buffers are full; None only skips its packages."""
+    """Close a client that has not read for this long once its buffers are full, or whose machine has acknowledged
+    nothing for this long: its power or cable is gone. None only skips its packages."""
     drop: float = 0.0
     """Probability that a package is not sent."""
     duplicate: float = 0.0

@@ -352,6 +352,9 @@ class _Connection(asyncio.Protocol):
         # A small send buffer makes it show soon that a client does not read.
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        limit = self._server.faults.overflow_close
+        if limit is not None:  # a client whose machine lost its power, or its cable, acknowledges nothing
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(limit * 1000))
         if self._server.stepped:
             self._transport.set_write_buffer_limits(0)
         self._write(self._session.greeting())

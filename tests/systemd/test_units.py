@@ -60,7 +60,14 @@ def exposure(unit: Path) -> float:
 @needs_systemd
 @pytest.mark.parametrize(
     "drop_in",
-    [None, "addresses.conf", "unprivileged-ports.conf", "reload-by-signal.conf", "serial-ports.conf"],
+    [
+        None,
+        "addresses.conf",
+        "unprivileged-ports.conf",
+        "reload-by-signal.conf",
+        "serial-ports.conf",
+        "standby.conf",
+    ],
 )
 @pytest.mark.parametrize("unit", UNITS)
 def test_systemd_finds_no_mistake(unit: str, drop_in: str | None, tmp_path: Path) -> None:
