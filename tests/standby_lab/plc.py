@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-PATIENCE = 0.25
+PATIENCE = 0.1
 """Seconds for connection and answer; then it connects anew."""
 
 
