@@ -92,6 +92,9 @@ class Host(WithoutCells):
     def oversized(self, message: Oversized, now: float) -> None:
         """Nobody sends such."""
 
+    def flooded(self, count: int, now: float) -> None:
+        """Nobody sends as many to it."""
+
     def lost(self, reason: str, now: float) -> None:
         """It comes again."""
 

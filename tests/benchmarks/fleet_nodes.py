@@ -139,6 +139,9 @@ class Speech(WithoutCells):
     def oversized(self, message: Oversized, now: float) -> None:
         """Nobody sends such."""
 
+    def flooded(self, count: int, now: float) -> None:
+        """Nobody sends as many to it."""
+
     def lost(self, reason: str, now: float) -> None:
         self._node.edge.lost(self._node.now())
 
