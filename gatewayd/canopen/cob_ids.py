@@ -37,6 +37,11 @@ _RESTRICTED = (
     (0x780, 0x7FF),
 )
 
+_NODE_ID = 0x7F
+_OF_NODES = frozenset(
+    (Function.EMCY, *range(Function.TPDO1, Function.SDO_REQUEST + 1, 0x80), Function.ERROR_CONTROL)
+)
+
 
 def is_restricted(can_id: int) -> bool:
     """Whether no configurable service (PDO, SYNC, TIME, EMCY) may have this identifier."""
@@ -53,3 +58,9 @@ def predefined_pdo(number: int, node: int, *, transmit: bool) -> int | None:
     if not 1 <= number <= 4:
         return None
     return (Function.TPDO1 if transmit else Function.RPDO1) + 0x100 * (number - 1) + node
+
+
+def node_of(can_id: int) -> int | None:
+    """The node whose identifier it is in the predefined connection set; None: nobody's alone (NMT, SYNC, LSS, ...)."""
+    base, node = can_id & ~_NODE_ID, can_id & _NODE_ID
+    return node if node and base in _OF_NODES else None

@@ -49,7 +49,7 @@ class Trace:
         cell = source[0] if passage.cell == "" else passage.cell
         if self._cell is not None and cell not in (self._cell, None):
             return
-        if self._link is not None and self._link not in source[1:]:
+        if self._link is not None and self._link not in (*source[1:], *passage.links):
             return
         if self._peer is not None and self._peer not in (passage.peer, host_of(passage.peer)):
             return
@@ -70,7 +70,7 @@ class Trace:
                 {
                     "time": round(passage.time + ahead, 6),
                     "cell": cell if passage.cell == "" else passage.cell,
-                    "link": link,
+                    "link": passage.links[0] if len(passage.links) == 1 else link,
                     "kind": kind,
                     "peer": passage.peer,
                     "own": passage.own,

@@ -181,6 +181,8 @@ class Passage:
     """Address and port of our end; on a bus the name of the interface."""
     cell: str | None = ""
     """Of a part that several cells share: the cell that it concerns; None: none, or any. Empty: that of the link."""
+    links: tuple[str, ...] = ()
+    """Of a part that several links of a kind share: the names of those that it concerns. Empty: that of the part."""
 
 
 Tap = Callable[[Passage], None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.canopen.cob_ids import is_restricted, predefined_pdo
+from gatewayd.canopen.cob_ids import is_restricted, node_of, predefined_pdo
 
 
 def test_predefined_pdos_are_those_of_the_standard() -> None:
@@ -46,3 +46,12 @@ def test_every_predefined_pdo_may_be_used() -> None:
                 can_id = predefined_pdo(number, node, transmit=transmit)
                 assert can_id is not None
                 assert not is_restricted(can_id)
+
+
+@pytest.mark.parametrize(
+    "can_id, node",
+    [(0x085, 5), (0x185, 5), (0x57F, 127), (0x585, 5), (0x605, 5), (0x705, 5)]
+    + [(can_id, None) for can_id in (0x000, 0x005, 0x080, 0x105, 0x180, 0x685, 0x7E4, 0x7E5, 0x80000000)],
+)
+def test_whose_identifier_it_is(can_id: int, node: int | None) -> None:
+    assert node_of(can_id) == node

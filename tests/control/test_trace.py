@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from gatewayd.control.trace import MAX_BYTES, MAX_PASSAGES, MAX_TRACES, Row, Trace, Traces
@@ -44,6 +46,18 @@ def test_what_concerns_no_cell_is_in_the_trace_of_every_cell() -> None:
     trace = Trace("press")
     trace.take(MODBUS, passage(cell=None))
     assert rows(trace)[0]["cell"] is None
+
+
+def test_what_passes_a_shared_line_is_found_by_the_names_of_its_links() -> None:
+    devices = ("", "devices", "devices")
+    for links, shown in ((("island",), "island"), (("island", "gripper"), "devices"), ((), "devices")):
+        of_line = replace(passage(), links=links)
+        for chosen in ("island", "devices", "gripper", "robot"):
+            trace = Trace(link=chosen)
+            trace.take(devices, of_line)
+            found = rows(trace)
+            assert bool(found) is (chosen == "devices" or chosen in links)
+            assert all(row["link"] == shown for row in found)
 
 
 def test_a_row_has_everything_raw() -> None:

@@ -10,6 +10,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Value
 from gatewayd.core.requester import Requester
 from gatewayd.links.contract import Link
+from gatewayd.links.devices.concerned import DeviceId
 from gatewayd.links.devices.inflow import Inflow
 from gatewayd.links.devices.outflow import Outflow
 from gatewayd.links.devices.plan import DevicePlan
@@ -65,6 +66,11 @@ class DeviceLink(Link):
         raise NotImplementedError
 
     # -- as a link ------------------------------------------------------------------------------------------------
+
+    @property
+    def device_id(self) -> DeviceId:
+        """The device, for traces."""
+        return DeviceId(self._cell.definition.name, self.plan.name)
 
     @property
     def progress(self) -> int:

@@ -10,6 +10,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from gatewayd.canopen.cob_ids import node_of
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.manager.bus_manager import ManagerError
 from gatewayd.canopen.manager.plan import ManagerPlan
@@ -19,6 +20,7 @@ from gatewayd.links.can_frames import packed
 from gatewayd.links.contract import Link, Passage, Prepared, SharedPart, Tap
 from gatewayd.links.devices.at_work import NothingPrepared, Work, WorkGroup, end_all
 from gatewayd.links.devices.canopen.managed import ManagedDevice
+from gatewayd.links.devices.concerned import Concerned, concerned_by
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.mapping.plan import Plan
@@ -37,6 +39,16 @@ class _BusAtWork:
     def __post_init__(self) -> None:
         """The manager at work."""
         self.work = Work(f"CAN manager {self.manager.plan.channel}", self.manager.run)
+
+    def concerned(self, frame: Frame) -> Concerned:
+        """The device whose frame it is, by its PDOs or the predefined connection set; otherwise all of them."""
+        number = node_of(frame.can_id)
+        found = [
+            link
+            for link in self.links.values()
+            if any(pdo.cob_id == frame.can_id for pdo in link.plan.node.pdos)
+        ] or [link for node, link in self.links.items() if node == number]
+        return concerned_by([link.device_id for link in found or self.links.values()])
 
 
 class CanopenBuses(SharedPart):
@@ -75,7 +87,7 @@ class CanopenBuses(SharedPart):
         """All frames of all buses."""
         self._tap = tap
         for bus in self.buses.values():
-            self._put_tap(bus.manager)
+            self._put_tap(bus)
 
     async def prepare(self, plans: Sequence[Plan]) -> Prepared:
         """Nothing: a bus that cannot be used keeps no mapping from being served."""
@@ -121,17 +133,18 @@ class CanopenBuses(SharedPart):
             return all(link.core_lives(now) for link in bus.links.values())
 
         bus = _BusAtWork(Manager(plan, alive=alive, report=report))
-        self._put_tap(bus.manager)
+        self._put_tap(bus)
         return bus
 
-    def _put_tap(self, manager: Manager) -> None:
-        tap, peer = self._tap, f"CAN {manager.plan.channel}"
+    def _put_tap(self, bus: _BusAtWork) -> None:
+        tap, peer = self._tap, f"CAN {bus.manager.plan.channel}"
 
         def passing(frame: Frame, outgoing: bool) -> None:
             if tap is not None:
-                tap(Passage(clock.now(), packed(frame), outgoing, peer=peer, cell=None))
+                cell, links = bus.concerned(frame)
+                tap(Passage(clock.now(), packed(frame), outgoing, peer=peer, cell=cell, links=links))
 
-        manager.tap = passing if tap is not None else None
+        bus.manager.tap = passing if tap is not None else None
 
     def _detach_all(self, bus: _BusAtWork) -> None:
         for number in list(bus.links):

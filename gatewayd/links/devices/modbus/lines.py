@@ -14,6 +14,7 @@ from typing import Protocol, cast
 from gatewayd.core.cell import Cell
 from gatewayd.links.contract import Link, Prepared, SharedPart, Tap
 from gatewayd.links.devices.at_work import NothingPrepared, Work, WorkGroup, end_all
+from gatewayd.links.devices.concerned import Concerned, DeviceId, concerned_by
 from gatewayd.links.devices.modbus.plan import LineAddress, ModbusDevicePlan
 from gatewayd.links.devices.modbus.tapped import TappedRunner, TappedTcpLine
 from gatewayd.logs.records import fields
@@ -35,6 +36,10 @@ class DeviceOnLine(Protocol):
     @property
     def station(self) -> Station:
         """What the line asks."""
+
+    @property
+    def device_id(self) -> DeviceId:
+        """Which device it is."""
 
     def begin_anew(self) -> None:
         """Have a station that was on no line yet."""
@@ -134,7 +139,15 @@ class ModbusLines(SharedPart):
 
         runner = make_runner(address, Line(settings), report)
         runner.tap, runner.peer = self._tap, address.text
+        runner.is_rtu = address.serial is not None or address.framing == "rtu"
+        runner.concerned = lambda unit: self._concerned(address, unit)
         return _LineAtWork(address, runner)
+
+    def _concerned(self, address: LineAddress, unit: int) -> Concerned:
+        """The devices of this unit; of one that nobody has declared, all devices of the line."""
+        found = [device for device in self._devices if device.plan.line == address]
+        of_unit = [device for device in found if device.plan.unit == unit]
+        return concerned_by([device.device_id for device in of_unit or found])
 
     @staticmethod
     def _remove_all(line: _LineAtWork) -> None:

@@ -9,7 +9,9 @@ from uuid import uuid4
 
 import pytest
 
+from gatewayd.canopen.frame import Frame
 from gatewayd.core.cell import Cell
+from gatewayd.links.contract import Passage
 from gatewayd.links.devices.canopen.buses import CanopenBuses
 from gatewayd.links.devices.canopen.link import CanopenDeviceLink
 from tests.links.canopen_node.recorder import until
@@ -89,3 +91,22 @@ async def test_nothing_is_needed_beforehand() -> None:
     task.cancel()
     with suppress(asyncio.CancelledError):
         await task
+
+
+async def test_frames_of_a_device_are_traced_by_its_name() -> None:
+    """By its PDOs and the predefined connection set; NMT and SYNC concern all devices of the bus."""
+    channel = str(uuid4())
+    plan = planned(channel=channel)
+    link = link_of(plan, Cell(plan.cell))
+    moved = replace(the_device(plan).node.pdos[0], cob_id=0x3A0)
+    six = replace(the_device(plan), name="six", node=replace(the_device(plan).node, node=6, pdos=(moved,)))
+    other = CanopenDeviceLink(replace(six, places=()), Cell(plan.cell))
+    async with managed([link, other]) as buses:
+        passed: list[Passage] = []
+        buses.trace(passed.append)
+        tap = link.manager.tap if link.manager is not None else None
+        assert tap is not None
+        name = link.plan.name
+        for can_id, links in ((0x585, (name,)), (0x706, ("six",)), (0x3A0, ("six",)), (0x80, (name, "six"))):
+            tap(Frame(can_id, b""), False)
+            assert (passed[-1].links, passed[-1].cell) == (links, plan.cell.name)

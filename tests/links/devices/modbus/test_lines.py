@@ -158,6 +158,39 @@ def test_frames_can_be_traced() -> None:
         assert {passage.peer for passage in passed} == {rig.links["one"].plan.line.text}
         assert {passage.outgoing for passage in passed} == {True, False}
         assert all(len(passage.data) in (11, 12) for passage in passed)
+        # The unit is the seventh byte: each frame concerns the device that has it.
+        assert {(passage.data[6], passage.cell, passage.links) for passage in passed} == {
+            (1, "press", ("one",)),
+            (2, "press", ("two",)),
+        }
+
+    played(scenario)
+
+
+@pytest.mark.parametrize(
+    "is_rtu, outgoing, frame, links",
+    [
+        (False, True, "0009 0000 0006 07 03 0000 0001", ("one", "two")),
+        (True, True, "02 03 0000 0001 0000", ("two",)),
+        # A piece of a serial answer is that of whoever was asked last, whatever it begins with.
+        (True, False, "01 03 02", ("two",)),
+    ],
+)
+def test_a_frame_concerns_the_devices_of_its_unit_or_all_of_the_line(
+    is_rtu: bool, outgoing: bool, frame: str, links: tuple[str, ...]
+) -> None:
+    async def scenario(_units: Units, rig: Rig, lines: ModbusLines) -> None:
+        await until(lambda: rig.robot.value("two") == 2)
+        passed: list[Passage] = []
+        (line,) = lines.lines.values()
+        lines.trace(passed.append)
+        line.runner.is_rtu = is_rtu
+        line.runner.sent(bytes((2, 3, 0, 0, 0, 1, 2)))
+        if outgoing:
+            line.runner.sent(bytes.fromhex(frame))
+        else:
+            line.runner.received(bytes.fromhex(frame))
+        assert passed[-1].links == links
 
     played(scenario)
 
