@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 CONNECT_WITHIN = 5.0
 """Seconds for each step: look-up, connection with TLS, the broker's answer."""
+READ_RATE = 200.0
+"""Messages with QoS 0 a second that are read; a burst of as many. What comes beyond costs a few microseconds each."""
 _LEAVE_WITHIN = 1.0
 _CONNECTION = "gatewayd.mqtt.connection"
 NOT_INSTALLED = "paho-mqtt is not installed: pip install 'gatewayd[mqtt]'"
@@ -88,6 +90,7 @@ class MqttClient:
         self.progress = 0
         """Moves several times a second while `run` works, whatever the broker does."""
         self.tap: Callable[[bytes, bool, tuple[str, int] | None], object] | None = None
+        self.read_rate = READ_RATE
         self._user = user
         self._pause = ReconnectPause(chance)
         self._connection: BrokerConnection | None = None
@@ -204,7 +207,7 @@ class MqttClient:
         from gatewayd.mqtt.connection import BrokerConnection  # noqa: PLC0415 - see above; loaded by now
 
         loop = asyncio.get_running_loop()
-        connection = BrokerConnection(self.settings, credentials.password, self._user.will())
+        connection = BrokerConnection(self.settings, credentials.password, self._user.will(), self.read_rate)
         connection.received = self._user.received
         connection.oversized = self._user.oversized
         connection.subscribed = self._user.subscription

@@ -16,8 +16,6 @@ from gatewayd.mqtt.waiting import WaitedMessages
 _TYPE_AND_QOS, _PUBLISH = 0xF6, 0x30
 MAX_UNSENT = 65_536
 """Bytes that wait in us for a slow broker; beyond them nothing is given any more."""
-MAX_RATE = 200.0
-"""Messages with QoS 0 a second that are read; a burst of as many. What comes beyond costs a few microseconds each."""
 MAX_TURN = 16
 """Messages that are served before others have their turn: some 2 ms, if each of them is a command."""
 
@@ -25,7 +23,10 @@ MAX_TURN = 16
 class BrokerConnection(asyncio.Protocol):
     """Ends with `lost`, which has the reason in words; everything before is reported by the callbacks."""
 
-    def __init__(self, settings: BrokerSettings, password: str | None, will: Message | None) -> None:
+    def __init__(
+        self, settings: BrokerSettings, password: str | None, will: Message | None, rate: float
+    ) -> None:
+        """`rate`: messages with QoS 0 a second that are read."""
         loop = asyncio.get_running_loop()
         self.accepted: asyncio.Future[None] = loop.create_future()
         """The broker takes the connection; ConnectionRefusedError with its words otherwise."""
@@ -44,7 +45,7 @@ class BrokerConnection(asyncio.Protocol):
         self._engine.message = self._message
         self._engine.subscribed = self._answered
         self._splitter = PacketSplitter()
-        self._allowance = Allowance(int(MAX_RATE), MAX_RATE)
+        self._allowance = Allowance(int(rate), rate)
         self._unread = 0
         self._transport: asyncio.Transport | None = None
         self._waited = WaitedMessages()

@@ -31,6 +31,7 @@ class Host(WithoutCells):
 
     def __init__(self, host: str, port: int) -> None:
         self.session = BrokerSession(BrokerSettings(host, port, "host"), self)
+        self.session.client.read_rate = 1e6  # the values of all nodes
         self.known: set[str] = set()
         """Edge nodes that were ever born."""
         self._began = 0
