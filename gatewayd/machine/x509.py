@@ -94,15 +94,18 @@ def parse(der: bytes) -> Certificate:
 
 def from_pem(text: bytes) -> tuple[Certificate, ...]:
     """The certificates of a PEM file, in their order. Raises CertificateError; also where there is none."""
+    return tuple(map(parse, ders_from_pem(text)))
+
+
+def ders_from_pem(text: bytes) -> tuple[bytes, ...]:
+    """The same as they are, as DER. Raises CertificateError."""
     blocks = _PEM.findall(text)
     if not blocks:
         raise CertificateError("no PEM certificate (-----BEGIN CERTIFICATE-----) in it")
     if len(blocks) > MAX_CERTIFICATES:
         raise CertificateError(f"{len(blocks)} certificates, more than {MAX_CERTIFICATES}")
     try:
-        return tuple(
-            parse(binascii.a2b_base64(b"".join(block.split()), strict_mode=True)) for block in blocks
-        )
+        return tuple(binascii.a2b_base64(b"".join(block.split()), strict_mode=True) for block in blocks)
     except binascii.Error as error:
         raise CertificateError(f"a certificate is not base64: {error}") from error
 

@@ -34,7 +34,7 @@ from gatewayd.modbus.areas import (
     MAX_WRITE_REGISTERS,
     MAX_WRITE_WITH_READ,
 )
-from gatewayd.modbus.describe import request_text
+from gatewayd.modbus.describe import request_text, writing
 from gatewayd.modbus.exceptions import ExceptionCode
 from gatewayd.modbus.identification import Identification
 
@@ -284,7 +284,9 @@ def _apply(
     """Hand all changes of one request to the cell at once, and every refusal of ours to its records."""
     refusal: Refusal | None
     value: Value | None = None
-    denied = unit.rights.denied(changes, unit.cell.image.values) if unit.rights is not None else None
+    denied: Refusal | None = None
+    if unit.rights is not None:
+        denied = unit.rights.denied(changes, unit.cell.image.values, writing(pdu))
     if denied is not None:
         value = value_for(changes, denied.variable) if not isinstance(changes, Refusal) else None
         refusal = denied

@@ -167,7 +167,7 @@ class ModbusListener:
             connection.trust = trust
             if reason:
                 connection.abort(reason)
-                self.disconnected(connection, at_once=connection.credentials.serial in trust.facts.revoked)
+                self.disconnected(connection, at_once=trust.facts.revokes(connection.credentials))
 
     async def start(self) -> None:
         """Listen. Raises ListenError; of a secured listener `renew` was called before."""

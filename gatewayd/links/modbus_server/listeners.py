@@ -206,7 +206,7 @@ def _key(listener: ModbusListener) -> _Key:
 
 
 def _endpoints(plans: Iterable[ModbusPlan]) -> dict[_Key, TrustFiles | None]:
-    """Where these are reached. Of cells that name different files for one listener the first counts (GW232)."""
+    """Where these are reached. Of cells that name different files for one listener the first counts (GW231)."""
     found: dict[_Key, TrustFiles | None] = {}
     for plan in plans:
         for endpoint, files in plan.endpoints.items():

@@ -49,13 +49,14 @@ async def keep_renewed(listeners: Callable[[], Iterable[ModbusListener]]) -> Non
 
 
 async def renew_changed(listeners: Iterable[ModbusListener]) -> list[str]:
-    """Read those files again that are others than before; returns what is wrong with any."""
+    """Read those files again that are others than before, or are used up; returns what is wrong with any."""
     problems = []
     for listener in list(listeners):
         files = listener.files
         if files is not None and listener.listening:
             stamps = await in_daemon_thread(partial(stamps_of, files), "certificates")
-            if stamps != listener.stamps:
+            used_up = listener.trust.is_used_up(time.time()) and not listener.problem
+            if stamps != listener.stamps or used_up:
                 await _renew(listener, files, stamps)
             if listener.problem:
                 problems.append(listener.problem)

@@ -28,6 +28,7 @@ class Rights:
         """Without this every request is refused, whatever it asks for."""
         readable = None if granted.readable is None else frozenset(granted.readable)
         self._writable = frozenset(granted.writable or ())
+        self._places = plan.placements
         self._hidden: dict[Area, frozenset[int]] = {
             area: frozenset(
                 address
@@ -56,23 +57,45 @@ class Rights:
             return False
         return self._hidden[span.area].isdisjoint(range(span.first, span.first + span.quantity))
 
-    def denied(self, changes: Sequence[Change] | Refusal, values: Sequence[Value]) -> Refusal | None:
+    def denied(
+        self, changes: Sequence[Change] | Refusal, values: Sequence[Value], span: Span | None
+    ) -> Refusal | None:
         """Why it may not write that: one of the variables is not its to write. `changes`: or why nobody may.
+
+        `span`: the addresses it would write.
 
         One that only shares a register, and stays as it is, stands in nobody's way.
         """
         if self.writes_all:
             return None
-        if not self._writable:
-            first = (
-                changes.variable if isinstance(changes, Refusal) else changes[0].variable if changes else None
+        if isinstance(changes, Refusal):
+            # The role is judged first: of what is not its own, a peer learns neither where it lies nor its limits.
+            foreign = self._foreign(span)
+            known = bool(self._writable) and foreign is None
+            return (
+                None
+                if known
+                else Refusal(Reason.NOT_IN_ROLE, changes.variable if foreign is None else foreign)
             )
-            return Refusal(Reason.NOT_IN_ROLE, first)
-        for change in () if isinstance(changes, Refusal) else changes:
+        if not self._writable:
+            return Refusal(Reason.NOT_IN_ROLE, changes[0].variable if changes else None)
+        for change in changes:
             unchanged = change.implied and change.value == values[change.variable]
             if change.variable not in self._writable and not unchanged:
                 return Refusal(Reason.NOT_IN_ROLE, change.variable)
         return None
+
+    def _foreign(self, span: Span | None) -> int | None:
+        """The first variable in the span that shares its address with none that is its to write."""
+        if span is None:
+            return None
+        found: dict[int, list[int]] = {}
+        for place in self._places:
+            if place.area is span.area:
+                for address in place.addresses:
+                    if 0 <= address - span.first < span.quantity:
+                        found.setdefault(address, []).append(place.variable)
+        return next((its[0] for _at, its in sorted(found.items()) if self._writable.isdisjoint(its)), None)
 
     def denies_status(self, first: int, words: Iterable[int]) -> bool:
         """Whether it may not write these words of the status block: the numbers there are those of variables."""

@@ -134,12 +134,13 @@ class SecurePeerConnection(PeerConnection):
             self.fail(PeerEventKind.UNVERIFIED, "certificate has expired")
             return
         self.handshaking = False
+        # Before it is admitted: a request that came with the last of the handshake may have waited through a gap.
+        self._more = self._incoming.pending > 0
         self.credentials = PeerCredentials(
             role, certificate.subject, certificate.serial, certificate.issuer_name, certificate.not_after
         )
         self.admission.connected(self)
         if not self.wire.is_closing():
-            self._more = self._incoming.pending > 0
             self._watch_again()
 
     def fail(self, kind: PeerEventKind, reason: str) -> None:
@@ -147,6 +148,9 @@ class SecurePeerConnection(PeerConnection):
         self.admission.refused(self, kind, reason)
         self.reason = reason
         self.poller.remove(self.descriptor)
+        if self.wire.get_write_buffer_size():
+            # It takes nothing of what it was sent, and would keep the socket open for as long as it likes.
+            self.wire.abort()
         # Not at once: a reset would overtake the alert, which says more.
         self.wire.close()
 

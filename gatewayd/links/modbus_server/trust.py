@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ssl
 import stat
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -18,7 +19,7 @@ from typing import NoReturn, TypeVar
 from gatewayd.links.modbus_server.credentials import PeerCredentials
 from gatewayd.links.modbus_server.plan import TrustFiles
 from gatewayd.machine.revocation import RevocationList, lists_from_pem
-from gatewayd.machine.x509 import Certificate, CertificateError, from_pem
+from gatewayd.machine.x509 import Certificate, CertificateError, ders_from_pem, from_pem, parse
 
 CIPHERS = "ECDHE+AESGCM:ECDHE+CHACHA20:!aNULL:!eNULL"
 """Of TLS 1.2; those of TLS 1.3 are all of this kind."""
@@ -36,6 +37,9 @@ _MISFITS = {"KEY_VALUES_MISMATCH", "KEY_TYPE_MISMATCH", "NO_CERTIFICATE_ASSIGNED
 _Parsed = TypeVar("_Parsed")
 MAX_FILE = 32 * 1024 * 1024
 """Bytes of one file."""
+MAX_SESSIONS = 256
+"""Sessions that OpenSSL keeps of clients with TLS 1.2 and without tickets, each with the client's certificates: 10 KiB
+and more. Its own bound is 20480, which would be hundreds of megabytes, and `ssl` has no way to another one."""
 
 
 class TrustError(OSError):
@@ -60,6 +64,8 @@ class FileFacts:
     lists: tuple[RevocationList, ...] = ()
     exposed: bool = False
     """The key can be read by others than its owner and its group."""
+    authorities: tuple[bytes, ...] = ()
+    """DER of `clients`."""
 
     @property
     def expiries(self) -> Mapping[str, float]:
@@ -75,9 +81,21 @@ class FileFacts:
         }
 
     @property
-    def revoked(self) -> frozenset[int]:
-        """Serial numbers that are on any list."""
-        return frozenset().union(*(one.serials for one in self.lists))
+    def revoked(self) -> frozenset[tuple[bytes, int]]:
+        """Name of the authority (DER) and serial number of everything that is on a list."""
+        return frozenset((one.issuer_name, serial) for one in self.lists for serial in one.serials)
+
+    def revokes(self, shown: PeerCredentials) -> bool:
+        """Whether a client's own certificate is on the list of its authority: others use the same numbers."""
+        own = [one for one in self.lists if one.issuer_name == shown.issuer]
+        # OpenSSL takes names for the same that are spelled otherwise; then nobody knows which list it was.
+        return any(shown.serial in one.serials for one in own or self.lists)
+
+    def ended_between(self, former: float, now: float) -> bool:
+        """Whether anything that lets clients in has expired within this time."""
+        times = [one.not_after for one in self.clients]
+        times += [one.next_update for one in self.lists if one.next_update is not None]
+        return any(former < at <= now for at in times)
 
     @property
     def is_whole_chain(self) -> bool:
@@ -95,8 +113,17 @@ class Trust:
     stamps: tuple[object, ...]
     """By which a later look knows whether a file is another one."""
     context: ssl.SSLContext = field(compare=False)
-    authorities: frozenset[bytes] = frozenset()
-    """DER of the certificates of the clients' authorities."""
+    read_at: float = 0.0
+    """Seconds since 1970."""
+
+    def is_used_up(self, now: float) -> bool:
+        """Whether the files have to be read again although they are the same.
+
+        OpenSSL resumes a session without a look at lists and authorities, and that these have expired meanwhile would
+        not be seen; a new context knows no sessions.
+        """
+        sessions = self.context.session_stats()["number"]
+        return sessions > MAX_SESSIONS or self.facts.ended_between(self.read_at, now)
 
 
 def load(files: TrustFiles) -> Trust:
@@ -104,7 +131,7 @@ def load(files: TrustFiles) -> Trust:
 
     Reads disks: call it in a thread of its own.
     """
-    stamps = stamps_of(files)
+    read_at, stamps = time.time(), stamps_of(files)
     facts = look(files)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
@@ -126,21 +153,27 @@ def load(files: TrustFiles) -> Trust:
         raise
     except OSError as error:
         _fail("key", files.key, _plain(error))
-    _load_locations(context, "clients", files.clients)
+    try:
+        context.load_verify_locations(cadata=b"".join(facts.authorities))
+    except ssl.SSLError as error:
+        _fail("clients", files.clients, f"cannot be used: {reason_of(error)}")
     if files.revoked is not None:
-        _load_locations(context, "revoked", files.revoked)
+        _load_lists(context, files.revoked)
         # Of every authority in a client's chain a list is asked for: one without a list is not let in.
         context.verify_flags |= ssl.VERIFY_CRL_CHECK_CHAIN
-    return Trust(files, facts, stamps, context, frozenset(context.get_ca_certs(binary_form=True)))
+    return Trust(files, facts, stamps, context, read_at)
 
 
 def look(files: TrustFiles) -> FileFacts:
     """What the files say. Raises TrustError for one that cannot be read."""
+    chain = _read("certificate", files.certificate, from_pem)
+    authorities = _read("clients", files.clients, _with_certificates)
     return FileFacts(
-        _read("certificate", files.certificate, from_pem),
-        _read("clients", files.clients, from_pem),
+        chain,
+        tuple(certificate for _der, certificate in authorities),
         () if files.revoked is None else _read("revoked", files.revoked, lists_from_pem),
         is_exposed(files.key),
+        tuple(der for der, _certificate in authorities),
     )
 
 
@@ -168,14 +201,30 @@ def ended_by(former: Trust, trust: Trust, shown: PeerCredentials) -> str:
     What it showed is not at hand any more, so where something was withdrawn that it may have been let in by, it has to
     show it anew.
     """
-    if shown.serial in trust.facts.revoked:
+    if trust.facts.revokes(shown):
         return "its certificate was revoked"
-    if former.authorities - trust.authorities:
+    if not set(former.facts.authorities) <= set(trust.facts.authorities):
         return "an authority of clients was withdrawn"
-    subjects = {one.subject_name for one in trust.facts.clients}
-    if trust.facts.revoked - former.facts.revoked and shown.issuer not in subjects:
+    by = {issuer for issuer, _serial in trust.facts.revoked - former.facts.revoked}
+    if by and _may_be_above(shown.issuer, by, trust.facts.clients):
         return "a certificate was revoked that may be in its chain"
     return ""
+
+
+def _may_be_above(name: bytes, by: Collection[bytes], known: Collection[Certificate]) -> bool:
+    """Whether one that these authorities issued may stand between a client and the last of its authorities."""
+    names, seen = {name}, set[bytes]()
+    while names:
+        name = names.pop()
+        seen.add(name)
+        above = {one.issuer_name for one in known if one.subject_name == name}
+        if not above:
+            return True  # the client sent it, and it is not at hand any more
+        above.discard(name)
+        if not above.isdisjoint(by):
+            return True
+        names |= above - seen
+    return False
 
 
 def reason_of(error: ssl.SSLError) -> str:
@@ -203,13 +252,26 @@ def _stamp(path: str) -> object:
     return found.st_ino, found.st_mtime_ns, found.st_size
 
 
-def _load_locations(context: ssl.SSLContext, key: str, path: str) -> None:
+def _load_lists(context: ssl.SSLContext, path: str) -> None:
+    before = context.cert_store_stats()["x509"]
     try:
         context.load_verify_locations(path)
     except ssl.SSLError as error:
-        _fail(key, path, f"cannot be used: {reason_of(error)}")
+        _fail("revoked", path, f"cannot be used: {reason_of(error)}")
     except OSError as error:
-        _fail(key, path, _plain(error))
+        _fail("revoked", path, _plain(error))
+    # Lists are signed, so they are fetched over any network; an authority among them would let its clients in.
+    if context.cert_store_stats()["x509"] != before:
+        _fail(
+            "revoked",
+            path,
+            "has a certificate among its lists",
+            "lists alone belong there; authorities into `clients`",
+        )
+
+
+def _with_certificates(text: bytes) -> tuple[tuple[bytes, Certificate], ...]:
+    return tuple((der, parse(der)) for der in ders_from_pem(text))
 
 
 def _plain(error: OSError) -> str:

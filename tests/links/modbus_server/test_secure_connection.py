@@ -9,17 +9,20 @@ import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
-from gatewayd.links.modbus_server import handshakes
+from gatewayd.core.refusal import Reason
+from gatewayd.links.modbus_server import handshakes, trust, waiting
 from gatewayd.links.modbus_server.link import ModbusUnit
 from gatewayd.links.modbus_server.listener import ModbusListener
 from gatewayd.links.modbus_server.peers import PeerEvent, PeerEventKind
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.renewal import renew_changed
+from gatewayd.loop import clock
 from tests.links.modbus_server.secured import (
     ILLEGAL_READ,
     ILLEGAL_WRITE,
@@ -32,7 +35,7 @@ from tests.links.modbus_server.secured import (
     listening,
     secured,
 )
-from tests.peers.authority import OPENSSL
+from tests.peers.authority import OPENSSL, Authority
 
 pytestmark = pytest.mark.skipif(OPENSSL is None, reason="no program openssl")
 
@@ -246,6 +249,17 @@ async def test_r31_a_role_reads_and_writes_what_it_may_and_nothing_else(
             "start is plc's: ownership"
         )
         assert await client.ask(bytes.fromhex("06 0000 8000")) == ILLEGAL_WRITE, "mode is no right of it"
+        assert await client.ask(bytes.fromhex("06 03e7 0001")) == bytes.fromhex("86 02"), "nothing is there"
+        assert await client.ask(bytes.fromhex("06 000b 0001")) == ILLEGAL_WRITE, (
+            "half of count: the role comes first"
+        )
+        assert await client.ask(bytes.fromhex("16 000b ffff 0000")) == bytes.fromhex("96 01")
+        assert await client.ask(bytes.fromhex("10 000a 0002 04 0001 0000")) == bytes.fromhex("90 01"), (
+            "part, and half"
+        )
+        assert await client.ask(bytes.fromhex("06 0064 0001")) == ILLEGAL_WRITE, (
+            "an output, which it may not read"
+        )
         assert await client.ask(bytes.fromhex("17 000a 0001 000b 0002 04 00000001")) == bytes.fromhex("97 01")
     event = [each for each in live_cell.events if each.kind is EventKind.REFUSED][-1]
     assert event.reason is not None
@@ -404,6 +418,37 @@ async def test_what_is_no_modbus_ends_the_connection(
     assert events[-1].reason.startswith("not Modbus TCP")
 
 
+async def test_a_request_that_came_with_the_end_of_the_handshake_and_waited_is_not_carried_out(
+    listener: ModbusListener,
+    certificates: Certificates,
+    live_cell: Cell,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A client with TLS 1.3 may ask before the gateway has read its certificate; then the process stands still."""
+    incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+    client = client_context(certificates, certificates.operator).wrap_bio(incoming, outgoing)
+    reader, writer = await asyncio.open_connection("127.0.0.1", listener.port)
+
+    async def until_done(step: Callable[[], object]) -> object:
+        while True:
+            try:
+                return step()
+            except ssl.SSLWantReadError:
+                writer.write(outgoing.read())
+                incoming.write(await reader.read(65536))
+
+    await until_done(client.do_handshake)
+    client.write(frame(WRITE))
+    now = clock.now()
+    listener.gap(now - 30, now)
+    writer.write(outgoing.read())
+    monkeypatch.setattr(waiting, "SETTLING", 0.0)
+    assert await until_done(lambda: client.read(100)) == frame(bytes.fromhex("86 06"))
+    assert live_cell.last_refusal is not None
+    assert live_cell.last_refusal.refusal.reason is Reason.WAITED
+    writer.close()
+
+
 # -- handshakes -----------------------------------------------------------------------------------------------------
 
 
@@ -491,6 +536,54 @@ async def test_a_revoked_client_is_ended_and_let_in_no_more(
     assert "its certificate was revoked" in ended
     assert live_cell.ownership.owners.count(None) == len(live_cell.ownership.owners)
     assert await refusal(listener, client_context(certificates, lost)) == "SSLV3_ALERT_CERTIFICATE_REVOKED"
+
+
+async def test_who_has_the_number_of_a_revoked_certificate_from_another_authority_stays(
+    plan: ModbusPlan, live_cell: Cell, certificates: Certificates, tmp_path: Path
+) -> None:
+    """The authorities of docs/howto/secure-modbus.md all begin with the same serial number."""
+    assert plan.tls is not None
+    old, new = Authority(tmp_path / "old", "Old"), Authority(tmp_path / "new", "New")
+    gone, stays = (each.role("operator", key="ec") for each in (old, new))
+    files = replace(plan.tls.files, clients=str(tmp_path / "clients"), revoked=str(tmp_path / "revoked"))
+
+    def write() -> None:
+        for name, kind in (("clients", "certificate"), ("revoked", "revoked")):
+            parts = [getattr(each, kind).read_bytes() for each in (old, new)]
+            (tmp_path / name).write_bytes(b"".join(parts))
+
+    write()
+    context = client_context(certificates, stays)
+    async with (
+        listening(replace(plan, tls=replace(plan.tls, files=files)), live_cell) as listener,
+        dialled(listener, context) as client,
+    ):
+        assert await client.ask(READ)
+        old.revoke(gone)
+        write()
+        assert await renew_changed([listener]) == []
+        assert await client.ask(READ)
+        assert await refusal(listener, context) == "served"
+        assert (
+            await refusal(listener, client_context(certificates, gone)) == "SSLV3_ALERT_CERTIFICATE_REVOKED"
+        )
+
+
+async def test_sessions_of_clients_without_tickets_are_kept_up_to_a_number(
+    listener: ModbusListener, certificates: Certificates, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """OpenSSL would keep 20480 of them, with certificates: hundreds of megabytes by a client that comes and goes."""
+    context = client_context(certificates, certificates.viewer)
+    context.maximum_version = ssl.TLSVersion.TLSv1_2
+    context.options |= ssl.OP_NO_TICKET
+    monkeypatch.setattr(trust, "MAX_SESSIONS", 1)
+    counts = []
+    for _ in range(2):
+        async with dialled(listener, context) as client:
+            assert await client.ask(READ)
+        assert await renew_changed([listener]) == []
+        counts.append(listener.trust.context.session_stats()["number"])
+    assert counts == [1, 0]
 
 
 async def test_time_of_an_idle_connection_is_that_of_requests(

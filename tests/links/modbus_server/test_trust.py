@@ -108,14 +108,42 @@ def test_a_file_that_is_another_one_has_another_stamp(tmp_path: Path) -> None:
     assert stamps_of(files) != first
 
 
-AUTHORITY = Certificate("CN=root", b"root", b"root", 0.0, 1.0)
+def test_an_authority_among_the_lists_lets_nobody_in(certificates: Certificates, tmp_path: Path) -> None:
+    """Lists are fetched over any network, as they are signed. OpenSSL would take a certificate from there, too."""
+    lists = tmp_path / "revoked.crl"
+    lists.write_bytes(
+        certificates.authority.revoked.read_bytes() + certificates.other.certificate.read_bytes()
+    )
+    with pytest.raises(TrustError, match=r"revoked: \S+ has a certificate among its lists"):
+        load(replace(certificates.files(), revoked=str(lists)))
+
+
+AUTHORITIES = (
+    Certificate("CN=root", b"root", b"root", 0.0, 100.0),
+    Certificate("CN=middle", b"middle", b"root", 0.0, 200.0),
+)
+OTHERS = RevocationList(b"other", 50.0, frozenset((9,)))
+"""Of another authority, which has numbers of its own."""
 
 
 def trust_with(authorities: set[bytes], *serials: int) -> Trust:
-    lists = (RevocationList(b"root", None, frozenset(serials)),)
-    facts = FileFacts((), (AUTHORITY,), lists)
+    lists = (RevocationList(b"root", None, frozenset(serials)), OTHERS)
+    facts = FileFacts((), AUTHORITIES, lists, authorities=tuple(authorities))
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    return Trust(TrustFiles("", "", "", None), facts, (), context, frozenset(authorities))
+    return Trust(TrustFiles("", "", "", None), facts, (), context, read_at=10.0)
+
+
+@pytest.mark.parametrize("now,used_up", [(49.0, False), (50.0, True), (100.0, True), (5.0, False)])
+def test_files_are_read_anew_when_something_in_them_expires(now: float, used_up: bool) -> None:
+    """OpenSSL would go on to resume sessions."""
+    assert trust_with(set()).is_used_up(now) is used_up
+
+
+def test_a_list_whose_authority_is_spelled_otherwise_counts() -> None:
+    """OpenSSL compares names without regard to case and spaces; then every list may be the one."""
+    facts = trust_with(set()).facts
+    assert not facts.revokes(PeerCredentials(None, "plc", 9, b"root", 0.0))
+    assert facts.revokes(PeerCredentials(None, "plc", 9, b"ROOT", 0.0))
 
 
 @pytest.mark.parametrize(
@@ -131,6 +159,12 @@ def trust_with(authorities: set[bytes], *serials: int) -> Trust:
             "a certificate was revoked that may be in its chain",
         ),
         (trust_with({b"a"}, 8), trust_with({b"a"}, 8), b"between", ""),
+        (
+            trust_with({b"a"}),
+            trust_with({b"a"}, 8),
+            b"middle",
+            "a certificate was revoked that may be in its chain",
+        ),
         (trust_with({b"a", b"b"}), trust_with({b"b"}), b"root", "an authority of clients was withdrawn"),
     ],
 )
