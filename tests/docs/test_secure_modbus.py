@@ -37,4 +37,4 @@ def test_the_recipe(tmp_path: Path) -> None:
     assert list(findings(files, time.time())) == []
     (client,) = from_pem((tmp_path / "commissioning" / "plc.crt").read_bytes())
     assert role_of(client) == "Operator"
-    assert load(files).facts.revoked == {(client.issuer_name, client.serial)}
+    assert load(files, time.time()).facts.revoked == {(client.issuer_name, client.serial)}

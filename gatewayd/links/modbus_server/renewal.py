@@ -27,7 +27,7 @@ log = logging.getLogger("gatewayd.modbus")
 
 async def read(files: TrustFiles) -> Trust:
     """Read the files. Raises TrustError."""
-    return await in_daemon_thread(partial(load, files), "certificates")
+    return await in_daemon_thread(partial(load, files, time.time()), "certificates")
 
 
 async def make_ready(listener: ModbusListener) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ssl
 import stat
-import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -113,7 +112,7 @@ class Trust:
     stamps: tuple[object, ...]
     """By which a later look knows whether a file is another one."""
     context: ssl.SSLContext = field(compare=False)
-    read_at: float = 0.0
+    read_at: float
     """Seconds since 1970."""
 
     def is_used_up(self, now: float) -> bool:
@@ -126,12 +125,12 @@ class Trust:
         return sessions > MAX_SESSIONS or self.facts.ended_between(self.read_at, now)
 
 
-def load(files: TrustFiles) -> Trust:
+def load(files: TrustFiles, now: float) -> Trust:
     """Read all of the files. Raises TrustError for the first thing because of which nobody could be served.
 
-    Reads disks: call it in a thread of its own.
+    `now`: seconds since 1970. Reads disks: call it in a thread of its own.
     """
-    read_at, stamps = time.time(), stamps_of(files)
+    stamps = stamps_of(files)
     facts = look(files)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
@@ -161,7 +160,7 @@ def load(files: TrustFiles) -> Trust:
         _load_lists(context, files.revoked)
         # Of every authority in a client's chain a list is asked for: one without a list is not let in.
         context.verify_flags |= ssl.VERIFY_CRL_CHECK_CHAIN
-    return Trust(files, facts, stamps, context, read_at)
+    return Trust(files, facts, stamps, context, now)
 
 
 def look(files: TrustFiles) -> FileFacts:

@@ -44,7 +44,7 @@ def findings(files: TrustFiles, now: float) -> Iterator[TrustFinding]:
         yield _unusable(error)
         return
     try:
-        load(files)
+        load(files, now)
     except TrustError as error:
         yield _unusable(error)
     yield from of_facts(facts, now)

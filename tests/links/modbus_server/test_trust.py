@@ -17,16 +17,18 @@ from gatewayd.machine.x509 import Certificate
 from tests.links.modbus_server.secured import Certificates
 from tests.peers.authority import OPENSSL, run
 
+NOW = 1.8e9
+
 pytestmark = pytest.mark.skipif(OPENSSL is None, reason="no program openssl")
 
 
 def test_files_that_fit(certificates: Certificates) -> None:
-    trust = load(certificates.files())
+    trust = load(certificates.files(), NOW)
     assert trust.facts.is_whole_chain
     assert [one.subject for one in trust.facts.chain] == ["CN=gateway", "CN=Commissioning"]
     assert trust.facts.expiries.keys() == {"certificate", "clients", "revoked"}
     assert not trust.facts.exposed
-    assert load(certificates.files(revoked=False)).facts.expiries.keys() == {"certificate", "clients"}
+    assert load(certificates.files(revoked=False), NOW).facts.expiries.keys() == {"certificate", "clients"}
 
 
 def _other_key(files: TrustFiles, certificates: Certificates, _folder: Path) -> TrustFiles:
@@ -80,7 +82,7 @@ def test_what_is_wrong_is_said_with_the_file(
     reason: str,
 ) -> None:
     with pytest.raises(TrustError, match=reason):
-        load(change(certificates.files(), certificates, tmp_path))
+        load(change(certificates.files(), certificates, tmp_path), NOW)
 
 
 def test_a_chain_that_ends_before_the_authority(certificates: Certificates) -> None:
@@ -115,7 +117,7 @@ def test_an_authority_among_the_lists_lets_nobody_in(certificates: Certificates,
         certificates.authority.revoked.read_bytes() + certificates.other.certificate.read_bytes()
     )
     with pytest.raises(TrustError, match=r"revoked: \S+ has a certificate among its lists"):
-        load(replace(certificates.files(), revoked=str(lists)))
+        load(replace(certificates.files(), revoked=str(lists)), NOW)
 
 
 AUTHORITIES = (
