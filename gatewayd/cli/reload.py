@@ -78,8 +78,9 @@ def _lines(answer: Mapping[str, Any]) -> list[str]:
     """What happened, in one line; then every reason, and what is or would be different."""
     result, reasons = answer.get("result"), answer.get("reasons", ())
     if result == "unchanged":
-        return ["nothing has changed"]
-    if result == "applied":
+        # Not the mapping, but certificates that could not be read again, say.
+        lines = ["nothing has changed" + (", but:" if reasons else "")]
+    elif result == "applied":
         lines = [f"reloaded in {answer.get('swap_ms', 0):.1f} ms"]
     elif result == "refused":
         lines = ["refused, the old mapping runs on:"]

@@ -64,6 +64,11 @@ def reloading(tmp_path: Path) -> Reloading:
 
 @pytest.mark.parametrize("outcome, code, said", [
     (ReloadOutcome(Ended.UNCHANGED), 0, "nothing has changed\n"),
+    (
+        ReloadOutcome(Ended.UNCHANGED, ("clients: /a.crt cannot be used",)),
+        0,
+        "nothing has changed, but:\n  clients: /a.crt cannot be used\n",
+    ),
     (ReloadOutcome(Ended.APPLIED, (), (), 0.0042, (CHANGE, DETAIL)), 0,
      f"reloaded in 4.2 ms\n  {CHANGE}\n  {DETAIL}\n"),
     (ReloadOutcome(Ended.REFUSED, ("press: why [left]",), details=(CHANGE,), objections=(LEFT,)), 1,
