@@ -10,7 +10,13 @@ import click
 from gatewayd.links.registry import kinds
 from gatewayd.report.format import age, counted
 
-_COLOURS: Final = {"good": "green", "partial": "yellow", "starting": "yellow", "lost": "red"}
+_COLOURS: Final = {
+    "good": "green",
+    "partial": "yellow",
+    "starting": "yellow",
+    "lost": "red",
+    "refusing": "red",
+}
 _NOUNS: Final = {"canopen": "node"}
 """Family -> what its `unit` is called there."""
 

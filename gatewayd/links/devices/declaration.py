@@ -24,7 +24,7 @@ class DeviceKind(LinkKind):
         "family": "how it is spoken to: `modbus`, `canopen`",
         "address": "where it is reached: host:port, serial port with its settings, or CAN bus",
         "unit": "unit id of a Modbus device, node-ID of a CANopen device, or null",
-        "state": "`starting`, `good`, `partial` (some values are lost), `lost`",
+        "state": "`starting`, `good`, `partial` (some values are lost), `refusing` (it refuses everything), `lost`",
         "reason": "why it is not good, or empty",
         "since": "seconds for which it is in this state",
         "round_trip": "seconds from request to answer, of the last one, or null",
@@ -47,7 +47,7 @@ class DeviceKind(LinkKind):
         "pdos_sent": "PDOs that it was sent",
     }
     metrics = (
-        LinkMetric("gatewayd_device_up", "up", "1 while the device answers"),
+        LinkMetric("gatewayd_device_up", "up", "1 while the device answers, and not by refusals alone"),
         LinkMetric(
             "gatewayd_device_round_trip_seconds",
             "round_trip",

@@ -66,6 +66,12 @@ class FamilyLanguage:
         """What tables show of one of these places: `device_place`, `device_type`, `device_scale`, `device_offset`."""
         raise NotImplementedError
 
+    def pdos(
+        self, document: Document, device: Part[DeviceSpec], places: Sequence[ExpandedPlace]
+    ) -> Mapping[int, str]:
+        """Place, by its number among those of the device -> PDO that carries it: what has one is not polled."""
+        return {}
+
     def compile(
         self,
         cell: ExpandedCell,

@@ -25,6 +25,7 @@ class DeviceState(IntEnum):
     GOOD = 2
     PARTIAL = 3
     LOST = 4
+    REFUSING = 5
 
     @property
     def text(self) -> str:
@@ -33,7 +34,10 @@ class DeviceState(IntEnum):
 
 
 STATUS_WORDS: Final = (
-    ("state", "0 no device, 1 starting, 2 good, 3 partial (some values are lost), 4 lost"),
+    (
+        "state",
+        "0 no device, 1 starting, 2 good, 3 partial (some values are lost), 4 lost, 5 refuses everything",
+    ),
     ("round_trip", "0.1 ms from the last request to its answer"),
     ("age", "milliseconds since the last answer; 65535: never, or longer"),
     ("answers", "requests that were answered, wraps"),
@@ -115,12 +119,17 @@ _LEVELS: Final = {
     DeviceState.GOOD: Level.GOOD,
     DeviceState.PARTIAL: Level.WARN,
     DeviceState.LOST: Level.BAD,
+    DeviceState.REFUSING: Level.BAD,
 }
-_REMEDIES: Final = {DeviceState.LOST: "; look at its power, its cable and its address"}
+_REMEDIES: Final = {
+    DeviceState.LOST: "; look at its power, its cable and its address",
+    DeviceState.REFUSING: "; look at the number of the unit or node, and at the addresses in the device's manual",
+}
 _WORDS: Final = {
     DeviceState.NONE: "is none",
     DeviceState.STARTING: "is not there yet",
     DeviceState.GOOD: "answers",
     DeviceState.PARTIAL: "is there in part",
     DeviceState.LOST: "is lost",
+    DeviceState.REFUSING: "refuses everything",
 }

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from gatewayd.core.definition import Direction
 from gatewayd.links.devices.declaration import KIND
 from gatewayd.links.devices.description import description
 from gatewayd.links.devices.expand import devices_of, family_of
 from gatewayd.links.devices.plan import DevicePlan
+from gatewayd.links.devices.sections import DeviceSpec
 from gatewayd.links.tables import LinkTables
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.plan import Plan
@@ -26,19 +29,30 @@ class DeviceTables(LinkTables):
         Column("device_scale", "owner", None),
         Column("device_offset", "owner", None),
         Column("device_poll", "owner", None),
+        Column("device_pdo", "owner", None),
     )
     screen = ()
     page = ()
 
     def rows(self, cell: ExpandedCell) -> Mapping[int, Sequence[Mapping[str, object]]]:
-        """Name of the device, the place in it, how the number is written there, and seconds between two reads."""
+        """Name of the device, the place in it, how the number is written there, and how it is carried."""
+        pdos = {
+            (name, number): label
+            for name, device in cell.document.parts(DeviceSpec).items()
+            for number, label in family_of(device.spec)
+            .pdos(cell.document, device, devices_of(cell).of(name))
+            .items()
+        }
+        numbers: Counter[str] = Counter()
         found: dict[int, list[Mapping[str, object]]] = {}
         for place in devices_of(cell).places:
+            pdo = pdos.get((place.name, numbers[place.name]))
+            numbers[place.name] += 1
             if place.device is None or place.where is None:
                 continue
             words = family_of(place.device.spec).row(place.where)
-            poll = place.poll if place.is_read else None
-            row = {"device": place.name, **words, "device_poll": poll}
+            poll = place.poll if place.is_read and pdo is None else None
+            row = {"device": place.name, **words, "device_poll": poll, "device_pdo": pdo}
             found.setdefault(place.variable.index, []).append(row)
         return found
 
@@ -55,15 +69,17 @@ class DeviceTables(LinkTables):
 
     def screen_table(self, cell: ExpandedCell) -> ReportTable:
         """Every place in every device."""
-        head = ("device", "place", "type", "variable", "poll")
+        head = ("device", "place", "type", "variable", "poll or PDO")
         rows = self.rows(cell)
         found = [
             (
                 plain(row["device"]),
                 plain(row["device_place"]),
                 plain(row["device_type"]),
-                f"{cell.variables[index].name} {'->' if row['device_poll'] else '<-'}",
-                "" if row["device_poll"] is None else f"{row['device_poll']:.6g} s",
+                f"{cell.variables[index].name} {'->' if cell.variables[index].direction is Direction.INPUT else '<-'}",
+                plain(row["device_pdo"] or "")
+                if row["device_poll"] is None
+                else f"{row['device_poll']:.6g} s",
             )
             for index, places in rows.items()
             for row in places

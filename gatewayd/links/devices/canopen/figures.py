@@ -28,7 +28,9 @@ def state_of(link: ManagedDevice) -> tuple[DeviceState, str]:
         return DeviceState.STARTING, f"the manager {node.boot.step.value}"
     reports = () if link.emergency is None else (f"it reports {link.emergency}",)
     reason = next(iter((*link.troubles, *reports)), "")
-    return (DeviceState.PARTIAL if reason else DeviceState.GOOD), reason
+    if not reason:
+        return DeviceState.GOOD, ""
+    return (DeviceState.REFUSING if link.refuses_everything else DeviceState.PARTIAL), reason
 
 
 def figures_of(link: ManagedDevice, now: float) -> DeviceFigures:

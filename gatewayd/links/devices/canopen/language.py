@@ -69,6 +69,13 @@ class CanopenFamily(FamilyLanguage):
             "device_offset": offset,
         }
 
+    def pdos(
+        self, document: Document, device: Part[DeviceSpec], places: Sequence[ExpandedPlace]
+    ) -> Mapping[int, str]:
+        """`TPDO 1`, as the layout has it."""
+        layout = lay_out(document, device, places)
+        return {number: layout.pdos[pdo].label for number, (pdo, _) in layout.carried.items()}
+
     def bus_uses(
         self, cell: ExpandedCell, device: Part[DeviceSpec], places: Sequence[ExpandedPlace]
     ) -> Iterable[BusUse]:

@@ -57,6 +57,8 @@ class CanopenDeviceLink(ManagedDevice):
         """What PDOs have brought that come when a value changes, by variable."""
         self._unread: dict[tuple[int, int], str] = {}
         self._unwritten: dict[tuple[int, int], str] = {}
+        self._written: set[tuple[int, int]] = set()
+        """Objects that it took the last time."""
         super().__init__(plan, cell, f"{plan.name} ({plan.address})")
 
     def _bind(self, cell: Cell) -> Collection[int]:
@@ -138,6 +140,13 @@ class CanopenDeviceLink(ManagedDevice):
         """What of it does not work although it is in operation, in words."""
         return (*self._unread.values(), *self._unwritten.values())
 
+    @property
+    def refuses_everything(self) -> bool:
+        """Whether nothing of what it was asked was of use, and no PDO brings or takes anything."""
+        if self.plan.node.pdos or self._written or not self.troubles:
+            return False
+        return self._by_object.keys() <= self._unread.keys()
+
     # -- called by the manager ------------------------------------------------------------------------------------
 
     def node_started(self, now: float) -> None:
@@ -206,6 +215,7 @@ class CanopenDeviceLink(ManagedDevice):
 
     def object_unwritten(self, index: int, subindex: int, reason: str, now: float) -> None:
         """The device did not take a value."""
+        self._written.discard((index, subindex))
         at = object_text(index, subindex)
         text = f"{at} was not written: {reason}"
         if self._unwritten.get((index, subindex)) != text:
@@ -218,6 +228,7 @@ class CanopenDeviceLink(ManagedDevice):
         """The device took a value."""
         self.heard = now
         self._unwritten.pop((index, subindex), None)
+        self._written.add((index, subindex))
 
     def emergency_received(self, message: EmergencyMessage, now: float) -> None:
         """It reports an error, or that it has gone."""
@@ -240,6 +251,7 @@ class CanopenDeviceLink(ManagedDevice):
         self._latest.clear()
         self._unread.clear()
         self._unwritten.clear()
+        self._written.clear()
         self.emergency = None
         self._failed = ""
 

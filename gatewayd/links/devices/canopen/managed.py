@@ -34,6 +34,11 @@ class ManagedDevice(DeviceLink, NodeObserver):
         """What of it does not work although it is in operation, in words."""
         raise NotImplementedError
 
+    @property
+    def refuses_everything(self) -> bool:
+        """Whether nothing of what it was asked was of use, and no PDO brings or takes anything."""
+        raise NotImplementedError
+
     def core_lives(self, now: float) -> bool:
         """Whether the core of its cell goes on: the manager's heartbeat says so to the devices."""
         raise NotImplementedError

@@ -50,6 +50,8 @@ class ModbusDeviceLink(DeviceLink):
         """Groups that the device refuses to be read, or that cannot be read, by area and address; and why."""
         self._unwritten: dict[Hashable, str] = {}
         """Writes that the device did not take, and why."""
+        self._written: set[Hashable] = set()
+        """Writes that it took the last time."""
         self._ended = False
         self.station = self._new_station()
 
@@ -132,7 +134,16 @@ class ModbusDeviceLink(DeviceLink):
         if station.state is UnitState.LOST:
             return DeviceState.LOST, station.reason
         reason = next(iter((*self._unread.values(), *self._unwritten.values())), "")
-        return (DeviceState.PARTIAL if reason else DeviceState.GOOD), reason
+        if not reason:
+            return DeviceState.GOOD, ""
+        return (DeviceState.REFUSING if self._refuses_everything else DeviceState.PARTIAL), reason
+
+    @property
+    def _refuses_everything(self) -> bool:
+        """Whether nothing of what it was asked was of use: most likely it is another device, or another unit of it."""
+        polls = self.station.settings.polls
+        wanted = {(group.area, group.address) for poll in polls for group in poll.groups}
+        return wanted <= self._unread.keys() and not self._written
 
     # -- called by the station ------------------------------------------------------------------------------------
 
@@ -158,7 +169,9 @@ class ModbusDeviceLink(DeviceLink):
         """A write was confirmed or given up."""
         if failure is None:
             self._unwritten.pop(key, None)
+            self._written.add(key)
             return
+        self._written.discard(key)
         variable = self._orders.variable_of(key)
         name = "" if variable is None else self._cell.definition.variables[variable].name
         if variable is not None and not (isinstance(failure, ExceptionAnswer) and failure.is_refusal):
@@ -177,6 +190,7 @@ class ModbusDeviceLink(DeviceLink):
             return
         self._unread.clear()
         self._unwritten.clear()
+        self._written.clear()
         if state is UnitState.ONLINE:
             log.info("device answers", extra=fields(**self._device_names()))
             self._outflow.connect(now)

@@ -13,6 +13,7 @@ from gatewayd.links.devices.canopen.sections import CanopenDeviceKeys, CanopenPl
 from gatewayd.links.devices.declaration import KIND
 from gatewayd.links.devices.modbus.sections import ModbusDeviceKeys, ModbusPlaceKeys
 from gatewayd.links.devices.sections import DeviceKeys, PlaceKeys
+from gatewayd.links.devices.tables import TABLES
 from gatewayd.mapping.loader import load
 from tests.links.devices.canopen.cells import SHEET, VARIABLES, line, planned, text, the_device
 
@@ -117,3 +118,16 @@ def test_identity_of_a_plan_follows_names_and_not_indices() -> None:
     assert isinstance(new, CanopenDevicePlan)
     assert old != new
     assert old.identity(plan.cell) == new.identity(moved.cell)
+
+
+def test_tables_say_what_carries_a_value() -> None:
+    """A PDO, or reads by SDO every so often. An output by SDO is written when it changes."""
+    found = load(text().encode(), "press.yaml").cell
+    assert [row[3:] for row in TABLES.screen_table(found).rows] == [
+        ("position ->", "TPDO 1"),
+        ("preset ->", "0.02 s"),
+        ("clamp <-", "RPDO 1"),
+        ("speed <-", ""),
+    ]
+    (position,) = TABLES.rows(found)[0]
+    assert (position["device_poll"], position["device_pdo"]) == (None, "TPDO 1")

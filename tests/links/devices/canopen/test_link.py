@@ -120,6 +120,23 @@ async def test_object_that_is_not_there_costs_its_own_variable(channel: str) -> 
         assert robot.owner("level") == ""
 
 
+async def test_device_that_refuses_all_objects_is_not_there_in_part(channel: str) -> None:
+    """None of its objects goes by a PDO, so nothing comes from it, although it is operational."""
+    nothing = (
+        "  level: {robot: input_int_register_5, device: {at: encoder, object: 0x6030}, owner: encoder}\n"
+    )
+    plan = planned(nothing, channel)
+    robot = FakeRobot(plan)
+    link = link_of(plan, robot.cell)
+    async with an_encoder(channel), managed([link]):
+        robot.fresh(clock.now())
+        await until(lambda: link.health().figures["state"] == "refusing")
+        assert (link.health().level, link.health().figures["up"]) == (Level.BAD, 0)
+        assert (
+            link.health().problems[0].startswith("device encoder refuses everything: `level` cannot be read")
+        )
+
+
 async def test_reload_goes_on_with_the_same_device(channel: str) -> None:
     plan = planned(channel=channel)
     robot = FakeRobot(plan)

@@ -93,6 +93,36 @@ def test_a_value_that_the_device_refuses_leaves_the_others(bench: Bench) -> None
     assert bench.figure("state") == "good"
 
 
+def test_a_device_that_refuses_everything_is_not_there_in_part() -> None:
+    bench = Bench()
+    bench.there()
+    bench.refuse(Area.DISCRETE)
+    bench.refuse(Area.INPUT)
+    assert bench.figure("state") == "partial", "one of three places has not been asked for yet"
+    bench.refuse(Area.HOLDING)
+    health = bench.link.health()
+    assert (health.level, health.figures["state"], health.figures["up"]) == (Level.BAD, "refusing", 0)
+    assert health.problems[0].startswith("device island refuses everything: ")
+    assert "look at the number of the unit" in health.problems[0]
+    # What it takes is something, until it takes that no more.
+    key = (Area.COIL, 0, None)
+    bench.link.write_done(key, None, bench.now)
+    assert bench.figure("state") == "partial"
+    bench.link.write_done(key, ExceptionAnswer(2), bench.now)
+    assert bench.figure("state") == "refusing"
+    bench.say(Area.INPUT, b"\x00\x01")
+    assert bench.figure("state") == "partial"
+
+
+def test_a_device_that_is_only_written_and_refuses_that_refuses_everything() -> None:
+    bench = Bench(name="gripper")
+    bench.link.station.write = lambda *_order: True  # type: ignore[method-assign,assignment]
+    bench.there()
+    assert bench.figure("state") == "good"
+    bench.link.write_done((Area.HOLDING, 1002, 0xFF), ExceptionAnswer(1), bench.now)
+    assert bench.figure("state") == "refusing"
+
+
 def test_an_output_that_changes_is_written(bench: Bench) -> None:
     bench.there()
     bench.robot.fresh(bench.now, clamp=True)
