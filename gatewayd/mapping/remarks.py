@@ -23,7 +23,9 @@ def remarks(cell: ExpandedCell) -> Iterator[str]:
             if variable.kind is not ValueKind.FLOAT:
                 continue
             if not reach.is_real:
-                whole[variable.part.name] = None
+                # A real that only comes from a device is a sum of its integers: nothing is made an integer.
+                if not reach.is_source:
+                    whole[variable.part.name] = None
             elif variable.direction is Direction.INPUT and variable.spec.limits is None:
                 unlimited[variable.part.name] = None
     if whole:

@@ -39,3 +39,19 @@ def test_nothing_happens() -> None:
         list(remarks(load((HEAD + "  f: {robot: runtime_state, modbus: 60}\n").encode(), "cell.yaml").cell))
         == []
     )
+
+
+def test_integers_of_a_device_are_no_reals_that_are_rounded() -> None:
+    """`level` is the integer of the device times 0.1: nothing of a real is lost. Outputs to it are rounded."""
+    devices = "devices: {island: {modbus: 127.0.0.3, watchdog: none}}\n"
+    head = HEAD.replace("writers:", f"{devices}writers:\n  island: {{device: island}}")
+    text = head + (
+        "  level: {robot: input_double_register_0, device: {at: island, input: 4, type: int16, scale: 0.1},"
+        " owner: island, limits: [0, 100]}\n"
+        "  speed: {robot: output_double_register_0, device: {at: island, holding: 4, type: int16, scale: 0.1}}\n"
+    )
+    found = load(text.encode(), "cell.yaml")
+    assert [each.message for each in found.errors] == []
+    (remark,) = remarks(found.cell)
+    assert remark.startswith("reals are rounded")
+    assert remark.endswith(": `speed`")
