@@ -98,7 +98,7 @@ soak: $(VENV)/.dev ## Torment the running daemon for an hour, from a seed (SECON
 	$(PY) -m tests.soak --seconds $(SECONDS) $(ARGS)
 
 lock: ## Pin and hash the newest packages that pyproject.toml allows (needs uv)
-	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --extra mqtt --group build -o requirements.lock
+	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group build -o requirements.lock
 	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
 	$(COMPILE) --upgrade --custom-compile-command "make lock" --group release -c requirements.lock -o requirements-release.lock
 

@@ -287,7 +287,6 @@ LIBRARIES: dict[str, set[str]] = {
     "canopen": {"canopen.importer", "canopen.manager.data_sheet"},
     "click": {"__main__", "cli"},
     "matplotlib": {"cli.rtde"},
-    "paho": {"mqtt.engine"},
     "numpy": {"cli.rtde", "rtde.recording"},
     "prometheus_client": {"web.metrics"},
     "pymodbus": {"demo.plc", "modbus.client.pdus"},

@@ -14,41 +14,23 @@ import socket
 import ssl
 from collections.abc import Callable, Sequence
 from functools import partial
-from importlib import import_module
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from gatewayd.loop.progress import STEP, wait_with_progress
 from gatewayd.loop.resolve import SocketAddress, resolve
 from gatewayd.loop.retry import reason_of
 from gatewayd.loop.threads import in_daemon_thread
+from gatewayd.mqtt.connection import BrokerConnection
 from gatewayd.mqtt.credentials import BrokerCredentials, CredentialsError, needs_files, read_credentials
 from gatewayd.mqtt.messages import BrokerSettings, Message, Received
 from gatewayd.mqtt.packets import Oversized
 from gatewayd.mqtt.pause import ReconnectPause
-
-if TYPE_CHECKING:
-    # Brings paho, which is an extra: imported when the first connection is made, by a thread.
-    from gatewayd.mqtt.connection import BrokerConnection
 
 CONNECT_WITHIN = 5.0
 """Seconds for each step: look-up, connection with TLS, the broker's answer."""
 READ_RATE = 200.0
 """Messages with QoS 0 a second that are read; a burst of as many. What comes beyond costs a few microseconds each."""
 _LEAVE_WITHIN = 1.0
-_CONNECTION = "gatewayd.mqtt.connection"
-NOT_INSTALLED = "paho-mqtt is not installed: pip install 'gatewayd[mqtt]'"
-
-
-class NotInstalledError(OSError):
-    """The library of the extra `mqtt` is not there."""
-
-
-async def load_library() -> None:
-    """Import what connections need, which takes 70 ms. Raises NotInstalledError."""
-    try:
-        await in_daemon_thread(partial(import_module, _CONNECTION), "mqtt import")
-    except ImportError as error:
-        raise NotInstalledError(NOT_INSTALLED) from error
 
 
 class ClientUser(Protocol):
@@ -188,7 +170,6 @@ class MqttClient:
 
     async def _open(self) -> BrokerConnection:
         """A connection that the broker has taken. Raises OSError."""
-        await load_library()
         await self._user.preparing()
         credentials = BrokerCredentials()
         if needs_files(self.settings):
@@ -204,8 +185,6 @@ class MqttClient:
         raise failure
 
     async def _try(self, address: SocketAddress, credentials: BrokerCredentials) -> BrokerConnection:
-        from gatewayd.mqtt.connection import BrokerConnection  # noqa: PLC0415 - see above; loaded by now
-
         loop = asyncio.get_running_loop()
         connection = BrokerConnection(self.settings, credentials.password, self._user.will(), self.read_rate)
         connection.received = self._user.received

@@ -5,13 +5,15 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from gatewayd.loop import clock
 from gatewayd.loop.allowance import Allowance
 from gatewayd.mqtt.engine import Engine
 from gatewayd.mqtt.messages import BrokerSettings, Message, Received
-from gatewayd.mqtt.packets import MqttProtocolError, Oversized, PacketSplitter
+from gatewayd.mqtt.packets import Oversized, PacketSplitter
 from gatewayd.mqtt.waiting import WaitedMessages
+from gatewayd.mqtt.wire import MqttProtocolError
 
 _TYPE_AND_QOS, _PUBLISH = 0xF6, 0x30
 MAX_UNSENT = 65_536
@@ -119,13 +121,14 @@ class BrokerConnection(asyncio.Protocol):
     def gap(self, since: float, until: float) -> None:
         """The process stood still: what is read next may have waited."""
         self._waited.gap(since, until)
+        self._engine.gap(until - since)
         self._queue = deque((packet, waited + until - since) for packet, waited in self._queue)
 
     def tick(self) -> None:
         """Pings, and whether they are answered."""
         if self.accepted.done() and not self.lost.done():
             try:
-                self._engine.tick()
+                self._engine.tick(clock.now())
             except TimeoutError as error:
                 self.end(str(error))
 
@@ -138,18 +141,22 @@ class BrokerConnection(asyncio.Protocol):
         """Send it now; False: it cannot be taken, and was not."""
         if not self.writable or self.lost.done():
             return False
-        self._engine.publish(message)
+        try:
+            self._engine.publish(message)
+        except ValueError as error:
+            self.end(str(error))
+            return False
         return True
 
     def subscribe(self, topics: Sequence[str], qos: int) -> None:
         """Ask for messages."""
         if topics and self.accepted.done() and not self.lost.done():
-            self._engine.subscribe(topics, qos)
+            self._ask(partial(self._engine.subscribe, topics, qos))
 
     def unsubscribe(self, topics: Sequence[str]) -> None:
         """Ask for them no more."""
         if topics and self.accepted.done() and not self.lost.done():
-            self._engine.unsubscribe(topics)
+            self._ask(partial(self._engine.unsubscribe, topics))
 
     def leave(self, reason: str = "the gateway has left") -> None:
         """Say DISCONNECT, so that the broker keeps the will to itself, and close when all was sent."""
@@ -190,6 +197,12 @@ class BrokerConnection(asyncio.Protocol):
                 self.end(f"not MQTT: {error}")
             except ConnectionResetError as error:
                 self.end(str(error))
+
+    def _ask(self, ask: Callable[[], None]) -> None:
+        try:
+            ask()
+        except ValueError as error:
+            self.end(str(error))
 
     def _serve_rest(self) -> None:
         clock.judged_now()

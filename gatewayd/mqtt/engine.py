@@ -1,83 +1,36 @@
-"""The packets of one connection by paho-mqtt, without its sockets, threads and clocks: bytes in, bytes out.
+"""The client's side of one MQTT connection (3.1.1 and 5.0): packets in, packets out, and pings. Pure.
 
-paho takes its connection from a method that is not documented, so its version is
-restricted to one minor release, and tests/mqtt/test_engine.py pins what is used.
+| packet of the broker | what is done |
+|---|---|
+| CONNACK | `accepted`, or `refused` with its words; nothing else may come before it |
+| PUBLISH with QoS 0, with QoS 1 | `message`; the latter is acknowledged first |
+| SUBACK | `subscribed` for each topic |
+| PUBACK, UNSUBACK, PINGRESP | noted |
+| DISCONNECT (5.0) | ConnectionResetError with its words |
+| any other, or one that is not as it has to be | MqttProtocolError |
+
+Nothing is sent again: the session ends with the connection.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Final
 
-from paho.mqtt.client import Client, MQTTMessage
-from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
-from paho.mqtt.packettypes import PacketTypes
-from paho.mqtt.properties import Properties
-from paho.mqtt.reasoncodes import ReasonCode
-from paho.mqtt.subscribeoptions import SubscribeOptions
+from gatewayd.mqtt import outgoing
+from gatewayd.mqtt.messages import MQTT_5, BrokerSettings, Message
+from gatewayd.mqtt.reasons import FAILED, connect_reason, reason
+from gatewayd.mqtt.wire import MAXIMUM_PACKET_SIZE, SERVER_KEEPALIVE, MqttProtocolError, PacketReader
 
-from gatewayd.mqtt.messages import MAX_PACKET, MQTT_5, BrokerSettings, Message
-from gatewayd.mqtt.packets import MqttProtocolError
-
-_PUBLISH = 0x30
-_QOS_2 = 0x04
-
-
-class _Pipe:
-    """What paho takes for its socket."""
-
-    def __init__(self, write: Callable[[bytes], object]) -> None:
-        self._write = write
-        self._packet = b""
-        self._position = 0
-
-    def give(self, packet: bytes) -> None:
-        self._packet, self._position = packet, 0
-
-    def recv(self, size: int) -> bytes:
-        if self._position >= len(self._packet):
-            raise BlockingIOError
-        data = self._packet[self._position : self._position + size]
-        self._position += len(data)
-        return data
-
-    def send(self, data: bytes | bytearray) -> int:
-        self._write(bytes(data))
-        return len(data)
-
-    def pending(self) -> int:
-        return len(self._packet) - self._position
-
-    def setblocking(self, _flag: bool) -> None:
-        pass
-
-    def fileno(self) -> int:
-        return -1
-
-    def close(self) -> None:
-        pass
-
-
-class _Client(Client):
-    """paho's client on a pipe."""
-
-    def __init__(self, pipe: _Pipe, settings: BrokerSettings) -> None:
-        is_5 = settings.version == MQTT_5
-        super().__init__(
-            CallbackAPIVersion.VERSION2,
-            client_id=settings.client,
-            clean_session=None if is_5 else True,
-            protocol=MQTTProtocolVersion.MQTTv5 if is_5 else MQTTProtocolVersion.MQTTv311,
-            reconnect_on_failure=False,
-        )
-        self._pipe = pipe
-
-    def _create_socket(self) -> Any:
-        return self._pipe
+_CONNACK, _PUBLISH, _PUBACK, _SUBACK, _UNSUBACK, _PINGRESP, _DISCONNECT = 0x2, 0x3, 0x4, 0x9, 0xB, 0xD, 0xE
+_RETAIN, _QOS_1, _QOS_2, _DUP = 0x1, 0x2, 0x4, 0x8
+_MAX_NUMBER: Final = 0xFFFF
+MAX_PENDING: Final = 1000
+"""Subscriptions without an answer; a broker that owes more does not work."""
 
 
 class Engine:
-    """The MQTT side of one connection. After an error it is used no more."""
+    """After an error it is used no more."""
 
     def __init__(
         self,
@@ -95,99 +48,137 @@ class Engine:
         self.subscribed: Callable[[Sequence[str], str], object] = lambda *_each: None
         """Called with topics and why the broker refuses them; empty: it does not."""
         self._settings = settings
-        self._pipe = _Pipe(write)
-        self._client = client = _Client(self._pipe, settings)
+        self._is_5 = settings.version == MQTT_5
+        self._password = password
+        self._will = will
+        self._write = write
+        self._keepalive = float(settings.keepalive)
+        self._max_size: int | None = None
+        """Bytes of a packet that the broker takes; None: it has not said."""
+        self._is_accepted = False
+        self._number = 0
         self._pending: dict[int, tuple[str, ...]] = {}
-        if settings.username:
-            client.username_pw_set(settings.username, password)
-        if will is not None:
-            client.will_set(will.topic, will.payload, will.qos, will.retain)
-        client.on_connect = self._on_connect
-        client.on_message = self._on_message
-        client.on_subscribe = self._on_subscribe
-        client.on_disconnect = self._on_disconnect
-        self._ended = ""
-        self._is_refused = False
+        self._is_sent = self._is_heard = True
+        """Whether anything was, since the last look."""
+        self._sent_at = self._heard_at = 0.0
+        self._pinged_at: float | None = None
 
     def begin(self) -> None:
-        """Say CONNECT: a clean session that ends with the connection, so that nothing is ever kept for us."""
-        if self._settings.version == MQTT_5:
-            properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call] # paho has types nearly everywhere
-            properties.MaximumPacketSize = MAX_PACKET
-            properties.SessionExpiryInterval = 0
-            self._client.connect(
-                "broker", keepalive=self._settings.keepalive, clean_start=True, properties=properties
-            )
-        else:
-            self._client.connect("broker", keepalive=self._settings.keepalive)
+        """Say CONNECT."""
+        self._send(outgoing.connect(self._settings, self._password, self._will))
 
     def receive(self, packet: bytes) -> None:
-        """Take one whole packet. Raises MqttProtocolError, whatever its bytes are."""
-        if packet[0] & 0xF0 == _PUBLISH and packet[0] & _QOS_2:
-            raise MqttProtocolError("a message with QoS 2, which nobody has subscribed to")
-        self._pipe.give(packet)
-        try:
-            code = self._client.loop_read()
-            self._client.loop_write()
-        except Exception as error:  # paho raises what its parsers meet: struct.error, IndexError and others
-            raise MqttProtocolError(f"{type(error).__name__}: {error}") from error
-        if self._is_refused:
-            return
-        if code is not MQTTErrorCode.MQTT_ERR_SUCCESS:
-            raise MqttProtocolError(self._ended or _words(code))
-        if self._ended:
-            raise ConnectionResetError(f"the broker ends the connection: {self._ended}")
+        """Take one whole packet. Raises MqttProtocolError and ConnectionResetError, whatever its bytes are."""
+        self._is_heard = True
+        kind, flags = packet[0] >> 4, packet[0] & 0x0F
+        reader = PacketReader.of(packet)
+        if kind == _CONNACK and not flags and not self._is_accepted:
+            self._connack(reader)
+        elif not self._is_accepted:
+            raise MqttProtocolError("a packet before the connection was accepted")
+        elif kind == _PUBLISH:
+            self._publish(flags, reader)
+        elif kind == _SUBACK and not flags:
+            self._suback(reader)
+        elif kind in (_PUBACK, _UNSUBACK) and not flags:
+            reader.number(2)
+        elif kind == _PINGRESP and not flags and not reader.left:
+            self._pinged_at = None
+        elif kind == _DISCONNECT and not flags and self._is_5:
+            why = reason(reader.number(1)) if reader.left else "without a reason"
+            raise ConnectionResetError(f"the broker ends the connection: {why}")
+        else:
+            raise MqttProtocolError(f"a packet that no broker sends: {packet[:1].hex()}")
 
-    def tick(self) -> None:
+    def gap(self, seconds: float) -> None:
+        """The process stood still: the broker had no less time for its answer."""
+        if self._pinged_at is not None:
+            self._pinged_at += seconds
+
+    def tick(self, now: float) -> None:
         """Send a ping when it is due. Raises TimeoutError where the broker has not answered the last one."""
-        if self._client.loop_misc() is not MQTTErrorCode.MQTT_ERR_SUCCESS or self._client.socket() is None:
-            raise TimeoutError("the broker does not answer")
+        if self._is_sent:
+            self._sent_at, self._is_sent = now, False
+        if self._is_heard:
+            self._heard_at, self._is_heard = now, False
+        if self._pinged_at is not None:
+            if now - self._pinged_at >= self._keepalive:
+                raise TimeoutError("the broker does not answer")
+        elif now - min(self._sent_at, self._heard_at) >= self._keepalive:
+            self._send(outgoing.PINGREQ)
+            self._pinged_at = now
 
     def publish(self, message: Message) -> None:
-        """Send a message. Raises ValueError for a topic that cannot be."""
-        self._client.publish(message.topic, bytes(message.payload), message.qos, message.retain)
+        """Send a message. Raises ValueError for a topic that cannot be, and for more than the broker takes."""
+        number = self._next_number() if message.qos else 0
+        packet = outgoing.publish(self._settings.version, message, number)
+        if self._max_size is not None and len(packet) > self._max_size:
+            raise ValueError(f"a message of {len(packet)} bytes, and the broker takes {self._max_size}")
+        self._send(packet)
 
     def subscribe(self, topics: Sequence[str], qos: int) -> None:
         """Ask for messages."""
-        if self._settings.version == MQTT_5:
-            options = SubscribeOptions(qos=qos, retainAsPublished=True)
-            _code, number = self._client.subscribe([(topic, options) for topic in topics])
-        else:
-            _code, number = self._client.subscribe([(topic, qos) for topic in topics])
-        if number is not None:
-            self._pending[number] = tuple(topics)
+        number = self._next_number()
+        self._pending[number] = tuple(topics)
+        self._send(outgoing.subscribe(self._settings.version, topics, qos, number))
 
     def unsubscribe(self, topics: Sequence[str]) -> None:
         """Ask for them no more."""
-        self._client.unsubscribe(list(topics))
+        self._send(outgoing.unsubscribe(self._settings.version, topics, self._next_number()))
 
     def end(self) -> None:
         """Say DISCONNECT: the broker forgets the will."""
-        self._client.disconnect()
+        self._send(outgoing.DISCONNECT)
 
-    def _on_connect(
-        self, _client: Client, _data: object, _flags: object, reason: ReasonCode, _properties: object
-    ) -> None:
-        if reason.is_failure:
-            self._is_refused = True
-            self.refused(str(reason))
-        else:
-            self.accepted()
+    # -- inside ------------------------------------------------------------------------------------------------------
 
-    def _on_message(self, _client: Client, _data: object, message: MQTTMessage) -> None:
-        self.message(message.topic, bytes(message.payload), message.retain, message.dup)
+    def _send(self, packet: bytes) -> None:
+        self._is_sent = True
+        self._write(packet)
 
-    def _on_subscribe(
-        self, _client: Client, _data: object, number: int, reasons: Sequence[ReasonCode], _properties: object
-    ) -> None:
-        for topic, reason in zip(self._pending.pop(number, ()), reasons, strict=False):
-            self.subscribed((topic,), str(reason) if reason.is_failure else "")
+    def _next_number(self) -> int:
+        if len(self._pending) >= MAX_PENDING:
+            raise ValueError("the broker answers no subscription")
+        self._number = self._number % _MAX_NUMBER + 1
+        while self._number in self._pending:
+            self._number = self._number % _MAX_NUMBER + 1
+        return self._number
 
-    def _on_disconnect(
-        self, _client: Client, _data: object, _flags: object, reason: ReasonCode, _properties: object
-    ) -> None:
-        self._ended = str(reason)
+    def _connack(self, reader: PacketReader) -> None:
+        reader.number(1)
+        code = reader.number(1)
+        if code:
+            self.refused(connect_reason(code))
+            return
+        found = reader.properties() if self._is_5 else {}
+        self._max_size = found.get(MAXIMUM_PACKET_SIZE)
+        # A broker that wants no pings (0) gets them all the same: they tell us that it is there.
+        self._keepalive = min(self._keepalive, float(found.get(SERVER_KEEPALIVE) or self._keepalive))
+        self._is_accepted = True
+        self.accepted()
 
+    def _publish(self, flags: int, reader: PacketReader) -> None:
+        if flags & _QOS_2:
+            raise MqttProtocolError("a message with QoS 2, which nobody has subscribed to")
+        topic = reader.text()
+        if not topic:
+            raise MqttProtocolError("a message without a topic")
+        if flags & _QOS_1:
+            self._send(outgoing.puback(reader.number(2)))
+        if self._is_5:
+            reader.properties()
+        self.message(topic, reader.rest(), bool(flags & _RETAIN), bool(flags & _DUP))
 
-def _words(code: MQTTErrorCode) -> str:
-    return code.name.removeprefix("MQTT_ERR_").lower().replace("_", " ")
+    def _suback(self, reader: PacketReader) -> None:
+        topics = self._pending.pop(reader.number(2), None)
+        if self._is_5:
+            reader.properties()
+        if topics is None or reader.left != len(topics):
+            raise MqttProtocolError("an answer to no subscription")
+        for topic, code in zip(topics, reader.rest(), strict=True):
+            self.subscribed((topic,), self._refusal(code))
+
+    def _refusal(self, code: int) -> str:
+        if code < FAILED:
+            return ""
+        return reason(code) if self._is_5 else "refused"

@@ -9,15 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gatewayd.mqtt.messages import MAX_PACKET
+from gatewayd.mqtt.wire import MqttProtocolError
 
 PUBLISH = 3
 _MAX_LENGTH_BYTES = 4
 _KEPT = 512
 """Bytes of an oversized message that are kept."""
-
-
-class MqttProtocolError(ValueError):
-    """The bytes are not MQTT; the connection cannot go on."""
 
 
 @dataclass(frozen=True, slots=True)

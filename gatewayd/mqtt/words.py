@@ -9,6 +9,8 @@ from __future__ import annotations
 from typing import Final
 
 from gatewayd.mqtt.messages import MQTT_5, MQTT_311
+from gatewayd.mqtt.reasons import FAILED, connect_reason
+from gatewayd.mqtt.wire import PROPERTIES, MqttProtocolError, PacketReader, ShortPacketError
 
 _NAMES: Final = (
     "reserved", "CONNECT", "CONNACK", "PUBLISH", "PUBACK", "PUBREC", "PUBREL", "PUBCOMP", "SUBSCRIBE", "SUBACK",
@@ -17,38 +19,6 @@ _NAMES: Final = (
 _CONNECT, _CONNACK, _PUBLISH, _SUBSCRIBE, _SUBACK = 1, 2, 3, 8, 9
 _MAX_PAYLOAD: Final = 200
 """Bytes of a payload that are shown."""
-_PROPERTIES: Final = frozenset(
-    {1, 2, 3, 8, 9, 11, 17, 18, 19, 21, 22, 23, 24, 25, 26, 28, 31, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42}
-)
-_FAILED: Final = 0x80
-
-
-class _ShortError(ValueError):
-    """The packet ends before what it should have."""
-
-
-class _Reader:
-    def __init__(self, data: bytes) -> None:
-        self.data = data
-        self.at = 0
-
-    def number(self, size: int) -> int:
-        if self.at + size > len(self.data):
-            raise _ShortError
-        self.at += size
-        return int.from_bytes(self.data[self.at - size : self.at], "big")
-
-    def text(self) -> str:
-        return self.take(self.number(2)).decode("utf-8", "replace")
-
-    def take(self, size: int) -> bytes:
-        if self.at + size > len(self.data):
-            raise _ShortError
-        self.at += size
-        return self.data[self.at - size : self.at]
-
-    def rest(self) -> bytes:
-        return self.data[self.at :]
 
 
 class PacketWords:
@@ -60,92 +30,81 @@ class PacketWords:
     def of(self, packet: bytes) -> str:
         """One whole packet in words. Never raises, whatever its bytes are."""
         kind, flags = packet[0] >> 4, packet[0] & 0x0F
-        start = 1
-        while start < len(packet) - 1 and packet[start] & 0x80:
-            start += 1
-        reader = _Reader(packet[start + 1 :])
+        reader = PacketReader.of(packet)
         try:
             more = self._more(kind, flags, reader)
-        except _ShortError:
+        except ShortPacketError:
             more = "cut short"
+        except MqttProtocolError as error:
+            more = f"not MQTT: {error}"
         return f"{_NAMES[kind]} {more}".rstrip()
 
-    def _more(self, kind: int, flags: int, reader: _Reader) -> str:
+    def _more(self, kind: int, flags: int, reader: PacketReader) -> str:
         if kind == _CONNECT:
             return self._connect(reader)
         if kind == _CONNACK:
             reader.number(1)
             code = reader.number(1)
-            return "accepted" if code == 0 else f"refused, code {code}"
+            return "accepted" if code == 0 else f"refused: {connect_reason(code)}"
         if kind == _PUBLISH:
             return self._publish(flags, reader)
         if kind in (_SUBSCRIBE, _SUBACK):
             return self._subscription(kind, reader)
         return ""
 
-    def _connect(self, reader: _Reader) -> str:
+    def _connect(self, reader: PacketReader) -> str:
         reader.text()
         self._version = reader.number(1)
         flags, keepalive = reader.number(1), reader.number(2)
         if self._version == MQTT_5:
-            reader.take(_varint(reader))
+            reader.take(reader.varint())
         client = reader.text()
         spoken = {MQTT_311: "3.1.1", MQTT_5: "5"}.get(self._version, f"level {self._version}")
         clean = "clean session" if flags & 2 else "session kept"
         will = ", with a will" if flags & 4 else ""
         return f"as {client}, MQTT {spoken}, {clean}, keep alive {keepalive} s{will}"
 
-    def _publish(self, flags: int, reader: _Reader) -> str:
+    def _publish(self, flags: int, reader: PacketReader) -> str:
         topic = reader.text()
         qos = flags >> 1 & 3
         if qos:
             reader.number(2)
         if self._version == MQTT_5 or (self._version is None and _has_properties(reader.rest())):
-            reader.take(_varint(reader))
+            reader.take(reader.varint())
         marks = [f"QoS {qos}"] if qos else []
         marks += ["retained"] if flags & 1 else []
         marks += ["again"] if flags & 8 else []
         shown = f" ({', '.join(marks)})" if marks else ""
         return f"{topic}{shown}: {_payload(reader.rest())}"
 
-    def _subscription(self, kind: int, reader: _Reader) -> str:
+    def _subscription(self, kind: int, reader: PacketReader) -> str:
         reader.number(2)
         if self._version == MQTT_5:
-            reader.take(_varint(reader))
+            reader.take(reader.varint())
         if kind == _SUBACK:
             codes = reader.rest()
-            refused = sum(code >= _FAILED for code in codes)
+            refused = sum(code >= FAILED for code in codes)
             return f"{refused} refused" if refused else "granted"
         begin = reader.at
         try:
             return ", ".join(_topics(reader))
-        except _ShortError:
+        except MqttProtocolError:
             if self._version is not None:
                 raise
         reader.at = begin
-        reader.take(_varint(reader))
+        reader.take(reader.varint())
         return ", ".join(_topics(reader))
 
 
-def _topics(reader: _Reader) -> list[str]:
+def _topics(reader: PacketReader) -> list[str]:
     topics = []
     while reader.rest():
         topic = reader.text()
         if not topic:
-            raise _ShortError  # the length of properties was taken for that of a topic
+            raise ShortPacketError  # the length of properties was taken for that of a topic
         topics.append(topic)
         reader.number(1)
     return topics
-
-
-def _varint(reader: _Reader) -> int:
-    value = 0
-    for shift in range(0, 28, 7):
-        byte = reader.number(1)
-        value |= (byte & 0x7F) << shift
-        if not byte & 0x80:
-            return value
-    raise _ShortError
 
 
 def _has_properties(data: bytes) -> bool:
@@ -153,7 +112,7 @@ def _has_properties(data: bytes) -> bool:
     if not data:
         return False
     length = data[0]
-    return length == 0 or (length < len(data) and data[1] in _PROPERTIES)
+    return length == 0 or (length < len(data) and data[1] in PROPERTIES)
 
 
 def _payload(data: bytes) -> str:

@@ -191,7 +191,7 @@ async def test_a_wrong_password_is_said_and_tried_again_when_the_file_changes(tm
         settings = settings_of(broker, username="press", password_file=str(secret))
         async with at_work(settings) as (client, user):
             await until(lambda: bool(user.losses), "a refusal")
-            assert user.losses[0] == "the broker refuses the connection: Not authorized"
+            assert user.losses[0] == "the broker refuses the connection: not authorized"
             secret.write_text("right\n")
             await until(lambda: client.is_connected, "a connection")
             secret.unlink()
@@ -270,13 +270,6 @@ def publish(broker: Mosquitto, topic: str, text: str, *options: str) -> None:
     """By mosquitto_pub."""
     command = ("mosquitto_pub", "-h", broker.host, "-p", str(broker.port), "-t", topic, "-m", text, *options)
     subprocess.run(command, check=True, capture_output=True)
-
-
-async def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_CONNECTION", "gatewayd.mqtt.no_such_module")
-    async with at_work(BrokerSettings(HOST, 1, "press")) as (_client, user):
-        await until(lambda: bool(user.losses), "a loss")
-        assert user.losses[0] == module.NOT_INSTALLED
 
 
 async def test_what_passes_can_be_traced(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.mqtt.packets import MqttProtocolError, Oversized, PacketSplitter
+from gatewayd.mqtt.packets import Oversized, PacketSplitter
+from gatewayd.mqtt.wire import MqttProtocolError
 
 PING = b"\xd0\x00"
 

@@ -41,7 +41,7 @@ def test_what_is_said(version: int, name: str, from_the_first: bool) -> None:
 def test_answers() -> None:
     words = PacketWords()
     assert words.of(b"\x20\x02\x00\x00") == "CONNACK accepted"
-    assert words.of(b"\x20\x02\x00\x05") == "CONNACK refused, code 5"
+    assert words.of(b"\x20\x02\x00\x05") == "CONNACK refused: not authorized"
     assert words.of(b"\x90\x03\x00\x01\x80") == "SUBACK 1 refused"
     assert words.of(b"\xd0\x00") == "PINGRESP"
     assert words.of(b"\x30\x05\x00\x01ahi") == "PUBLISH a: hi"

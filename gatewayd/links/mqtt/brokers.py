@@ -7,14 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from gatewayd.core.cell import Cell
-from gatewayd.links.contract import Link, Prepared, PrepareError, SharedPart, Tap
+from gatewayd.links.contract import Link, Prepared, SharedPart, Tap
 from gatewayd.links.mqtt.json_link import JsonLink
 from gatewayd.links.mqtt.link import MqttLink
-from gatewayd.links.mqtt.plan import MqttPlan
 from gatewayd.links.mqtt.session import BrokerSession
 from gatewayd.loop import clock
 from gatewayd.mapping.plan import Plan
-from gatewayd.mqtt.client import NotInstalledError, load_library
 from gatewayd.mqtt.messages import BrokerSettings
 from gatewayd.report.format import address
 
@@ -67,12 +65,7 @@ class Brokers(SharedPart):
             session.trace(tap)
 
     async def prepare(self, plans: Sequence[Plan]) -> Prepared:
-        """Have the library."""
-        if any(plan.of(MqttPlan) for plan in plans):
-            try:
-                await load_library()
-            except NotInstalledError as error:
-                raise PrepareError(str(error)) from error
+        """Nothing can fail."""
         return _NothingToPrepare()
 
     def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
