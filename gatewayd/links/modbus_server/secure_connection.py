@@ -24,6 +24,11 @@ from gatewayd.machine.x509 import CertificateError, parse
 
 _SCRATCH = memoryview(bytearray(4096))
 """What was read of a socket and not yet handed to OpenSSL; empty between two calls, so one is enough."""
+_PIECE = _SCRATCH[:512]
+"""What is decrypted at once, a usual request and more. A client may send key updates (TLS 1.3) instead, 27 bytes each,
+and OpenSSL carries out all it has in one call."""
+MAX_EMPTY = 32 * 1024
+"""Bytes without any of a request in them. A record of the greatest length, as yet incomplete, has half as many."""
 _NO_TLS = {"WRONG_VERSION_NUMBER", "HTTP_REQUEST", "HTTPS_PROXY_REQUEST", "PACKET_LENGTH_TOO_LONG"}
 _UNVERIFIED = {"PEER_DID_NOT_RETURN_A_CERTIFICATE", "CERTIFICATE_VERIFY_FAILED", "EXCESSIVE_MESSAGE_SIZE"}
 _REMEDIES = {
@@ -72,6 +77,8 @@ class SecurePeerConnection(PeerConnection):
         """Whether OpenSSL has something that was read from the socket already."""
         self._partial = False
         """Whether it may have the beginning of a record."""
+        self._empty = 0
+        """Bytes that came since there was anything of a request in them."""
         self._emptied = True
         """Whether the socket had less than was asked of it."""
 
@@ -167,17 +174,20 @@ class SecurePeerConnection(PeerConnection):
     def _read_decrypted(self, descriptor: int, space: Sequence[memoryview]) -> int:
         """In place of `os.readv`. Raises BlockingIOError where there is no whole record."""
         if not self._more:
-            count = os.readv(descriptor, (_SCRATCH,))
+            count = os.readv(descriptor, (_PIECE,))
             if not count:
                 return 0
-            self._emptied = count < len(_SCRATCH)
-            self._incoming.write(_SCRATCH[:count])
+            self._empty += count
+            self._emptied = count < len(_PIECE)
+            self._incoming.write(_PIECE[:count])
         try:
             # With a buffer to read into it is a count that is returned, which its declaration does not say.
             count = cast("int", self._tls.read(len(space[0]), space[0]))
         except ssl.SSLWantReadError:
             self._more, self._partial = False, True
             self._flush()
+            if self._empty > MAX_EMPTY:
+                raise ConnectionError("TLS: it sends records without requests") from None
             raise BlockingIOError from None
         except ssl.SSLZeroReturnError:
             return 0
@@ -185,6 +195,7 @@ class SecurePeerConnection(PeerConnection):
             self._flush()
             raise ConnectionError(f"TLS: {reason_of(error)}") from error
         self._more, self._partial = self._tls.pending() > 0 or self._incoming.pending > 0, False
+        self._empty = 0
         return count
 
     def _send(self, answers: bytes) -> None:

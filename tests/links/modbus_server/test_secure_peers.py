@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 from gatewayd.core.cell import Cell
 from gatewayd.links.modbus_server.listener import ModbusListener
+from gatewayd.links.modbus_server.peers import PeerEvent, PeerEventKind
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from tests.links.modbus_server.secured import Certificates, frame, listening, secured
 from tests.peers.authority import OPENSSL, Issued
@@ -20,13 +22,15 @@ pytestmark = pytest.mark.skipif(OPENSSL is None, reason="no program openssl")
 
 
 @pytest.fixture
-async def listener(
-    certificates: Certificates,
-    plan_of: Callable[..., ModbusPlan],
-    index_of: Callable[[str], int],
-    live_cell: Cell,
-) -> AsyncIterator[ModbusListener]:
-    async with listening(secured(plan_of(), certificates.files(), index_of), live_cell) as listener:
+def plan(
+    certificates: Certificates, plan_of: Callable[..., ModbusPlan], index_of: Callable[[str], int]
+) -> ModbusPlan:
+    return secured(plan_of(), certificates.files(), index_of)
+
+
+@pytest.fixture
+async def listener(plan: ModbusPlan, live_cell: Cell) -> AsyncIterator[ModbusListener]:
+    async with listening(plan, live_cell) as listener:
         yield listener
 
 
@@ -130,3 +134,25 @@ async def test_no_renegotiation(listener: ModbusListener, certificates: Certific
     out, error = await said(*command, send=b"R\n")
     assert b"RENEGOTIATING" in out + error
     assert b"no renegotiation" in error
+
+
+async def test_a_client_that_only_changes_keys_is_ended(
+    plan: ModbusPlan, live_cell: Cell, certificates: Certificates, events: list[PeerEvent]
+) -> None:
+    """Each costs the loop as much as ten requests, and is none. `K` has s_client send one."""
+    async with listening(plan, live_cell, events) as listener, asyncio.timeout(20):
+        process = await asyncio.create_subprocess_exec(
+            *(word for word in s_client(listener, certificates, "-tls1_3") if word != "-quiet"),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.DEVNULL,
+        )
+        assert process.stdin is not None
+        with suppress(ConnectionError):
+            while process.returncode is None:
+                process.stdin.write(b"K\n" * 4096)
+                await process.stdin.drain()
+        await process.wait()
+        while not events or events[-1].kind is not PeerEventKind.DISCONNECTED:  # noqa: ASYNC110 - no event of its own
+            await asyncio.sleep(0.005)
+    assert events[-1].reason == "TLS: it sends records without requests"
