@@ -23,6 +23,8 @@ from gatewayd.modbus.client.station import Job, Station
 from gatewayd.modbus.client.turns import Turns
 
 MAX_BROADCASTS = 16
+_SHORT_CONNECTIONS = 3
+"""Connections in a row that the device ended after one answer, from which on that is how it is."""
 
 
 class ConnectionUse(Enum):
@@ -69,6 +71,8 @@ class Line:
         self._paused_until = float("-inf")
         self._broadcasts: deque[ModbusRequest] = deque()
         self._has_finished = False
+        self._answers = 0
+        self._short_connections = 0
         self._culprit: Job | None = None
         self._is_culprit_known = False
         self._is_nobodys_fault = True
@@ -79,6 +83,11 @@ class Line:
     def stations(self) -> list[Station]:
         """The units."""
         return self._turns.stations
+
+    @property
+    def closes_after_answer(self) -> bool:
+        """Whether the device ends each connection after one answer, so that it is better asked by one for each."""
+        return self._short_connections >= _SHORT_CONNECTIONS
 
     @property
     def is_connected(self) -> bool:
@@ -121,6 +130,7 @@ class Line:
         is_new = self.settings.use is ConnectionUse.KEPT or bool(self.trouble) or not self.connections
         self._conversation = conversation
         self._has_finished = self._is_culprit_known = self.was_of_use = False
+        self._answers = 0
         self._unanswered_since = NEVER
         self.trouble = ""
         self.connections += 1
@@ -139,6 +149,8 @@ class Line:
         jobs = self._conversation.jobs if self._conversation is not None else []
         # A unit whose answers break the connection must not be probed again as often as that is opened again.
         self._is_nobodys_fault = self._conversation is None or not (jobs or self._is_culprit_known)
+        if self._conversation is not None and self.settings.use is ConnectionUse.KEPT:
+            self._short_connections = self._short_connections + 1 if self._answers == 1 else 0
         self._conversation = None
         self.trouble = reason
         culprit = self._culprit if self._is_culprit_known else next(iter(jobs), None)
@@ -246,6 +258,9 @@ class Line:
         self._has_finished = True
         is_answered = isinstance(outcome, bytes | ExceptionAnswer)
         self.was_of_use = self.was_of_use or is_answered
+        self._answers += is_answered
+        if self._answers > 1:
+            self._short_connections = 0
         if not is_answered:
             self._unanswered_since = min(self._unanswered_since, job.sent_at)
         station = job.station

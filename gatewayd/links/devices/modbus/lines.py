@@ -22,6 +22,7 @@ from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.client.line import ConnectionUse, Line, LineSettings
 from gatewayd.modbus.client.station import Station
 from gatewayd.modbus.client.tcp import TcpAddress, TcpFrames
+from gatewayd.report.wording import names_and_more
 
 log = logging.getLogger("gatewayd.devices")
 
@@ -85,6 +86,18 @@ class ModbusLines(SharedPart):
             f"line {address.text}": line.runner.progress + line.work.rests
             for address, line in self.lines.items()
         }
+
+    def troubles(self) -> Sequence[str]:
+        """Devices that end the connection after each answer: they are lost again and again, and nobody sees why."""
+        return [
+            f"{address.text}: the device closes the connection after each answer; "
+            f"set `connect: per_request` at {names_and_more(self._names(address))}"
+            for address, line in self.lines.items()
+            if line.runner.line.closes_after_answer
+        ]
+
+    def _names(self, address: LineAddress) -> list[str]:
+        return [device.plan.name for device in self._devices if device.plan.line == address]
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still: that is no silence of any device."""

@@ -41,6 +41,8 @@ class Units:
     def __init__(self) -> None:
         self.connections = 0
         self.asked: list[int] = []
+        self.closes = False
+        """Whether it closes a connection after its first answer."""
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.connections += 1
@@ -50,6 +52,8 @@ class Units:
                 await reader.readexactly(length - 1)
                 self.asked.append(unit)
                 writer.write(struct.pack(">HHHBBBH", transaction, 0, 5, unit, 3, 2, unit))
+                if self.closes:
+                    break
         writer.close()
 
 
@@ -165,6 +169,31 @@ def test_frames_can_be_traced() -> None:
         }
 
     played(scenario)
+
+
+def test_a_device_that_closes_after_each_answer_is_told_of_with_the_key_that_helps() -> None:
+    async def scenario(units: Units, _rig: Rig, lines: ModbusLines) -> None:
+        await until(lambda: len(units.asked) > 20)
+        assert lines.troubles() == []
+        units.closes = True
+        await until(lambda: bool(lines.troubles()))
+        (trouble,) = lines.troubles()
+        assert trouble.endswith(
+            ": the device closes the connection after each answer; set `connect: per_request` at `one` and `two`"
+        )
+        units.closes = False
+        await until(lambda: lines.troubles() == [])
+
+    played(scenario)
+
+
+def test_a_connection_for_each_request_is_no_trouble() -> None:
+    async def scenario(units: Units, _rig: Rig, lines: ModbusLines) -> None:
+        units.closes = True
+        await until(lambda: len(units.asked) > 10)
+        assert lines.troubles() == []
+
+    played(scenario, ", connect: per_request")
 
 
 @pytest.mark.parametrize(

@@ -116,7 +116,7 @@ def test_a_device_that_refuses_everything_is_not_there_in_part() -> None:
 
 def test_a_device_that_is_only_written_and_refuses_that_refuses_everything() -> None:
     bench = Bench(name="gripper")
-    bench.link.station.write = lambda *_order: True  # type: ignore[method-assign,assignment]
+    bench.link.station.write = lambda *_order: True  # type: ignore[method-assign]
     bench.there()
     assert bench.figure("state") == "good"
     bench.link.write_done((Area.HOLDING, 1002, 0xFF), ExceptionAnswer(1), bench.now)
