@@ -64,6 +64,7 @@ async def renew_changed(listeners: Iterable[ModbusListener]) -> list[str]:
 
 
 async def _renew(listener: ModbusListener, files: TrustFiles, stamps: tuple[object, ...]) -> None:
+    changed = stamps != listener.stamps
     try:
         trust = await read(files)
     except TrustError as error:
@@ -75,7 +76,8 @@ async def _renew(listener: ModbusListener, files: TrustFiles, stamps: tuple[obje
         return
     if files == listener.files:  # a reload may have named others meanwhile
         listener.renew(trust)
-        report(listener)
+        if changed:
+            report(listener)
 
 
 def problems_of(listener: ModbusListener) -> tuple[str, ...]:
