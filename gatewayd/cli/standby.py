@@ -78,9 +78,13 @@ def switch(client: Client, cell: str | None) -> None:
     """
     from gatewayd.control.client import segment
 
-    served = [name for name, standby in _cells(client, cell) if cell or standby["role"] == "active"]
+    pairs = list(_cells(client, cell))
+    if not pairs:
+        raise RemoteError(f"{cell or 'no cell here'} has no second gateway (`standby:` in the mapping)")
+    served = [name for name, standby in pairs if cell or standby["role"] == "active"]
     if not served:
-        raise RemoteError("this gateway serves no cell that has a second gateway")
+        roles = ", ".join(f"{name} is {standby['role']}" for name, standby in pairs)
+        raise RemoteError(f"this gateway serves no cell that could be handed over: {roles}")
     for name in served:
         began = time.monotonic()
         client.post(f"/v1/cells/{segment(name)}/hand-over", {})

@@ -24,13 +24,17 @@ COMMANDS = re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no program openssl")
 def test_the_recipe(tmp_path: Path) -> None:
     etc = tmp_path / "etc"
-    # Another folder than the system's, and no group that only the package makes.
-    script = "\n".join(COMMANDS).replace("/etc/gatewayd", str(etc)).replace(" -g gatewayd", "")
-    done = subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "subject=CN = plc-press-3" in done.stdout
+    output = ""
+    for number, commands in enumerate(COMMANDS):
+        # Another folder than the system's, and no group that only the package makes. A shell for each, as in practice.
+        script = commands.replace("/etc/gatewayd", str(etc)).replace(" -g gatewayd", "")
+        where = tmp_path / "commissioning" if number else tmp_path
+        bash = ["bash", "-euo", "pipefail", "-c", script]
+        done = subprocess.run(bash, cwd=where, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        output += done.stdout
+    assert "subject=CN = plc-press-3" in output
+    assert "..Operator" in output
     tls = etc / "tls"
     names = ("cell.crt", "cell.key", "clients.crt", "revoked.crl")
     files = TrustFiles(*(str(tls / name) for name in names))

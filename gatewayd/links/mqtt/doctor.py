@@ -125,8 +125,15 @@ def command_topics(plan: MqttPlan) -> list[str]:
     return [plan.topic_of(known) for known, _writer in plan.writers] if plan.sparkplug is None else []
 
 
+def _is_unresolved(trouble: str) -> bool:
+    """What getaddrinfo(3) says of a name without an address."""
+    return "name resolution" in trouble or "name or service not known" in trouble
+
+
 def _cause(trouble: str) -> str:
     lower = trouble.lower()
+    if _is_unresolved(lower):
+        return "no name server that this machine asks knows the name, or none answers"
     if "certificate" in lower or "tls" in lower:
         return "broker and mapping do not agree about TLS"
     if "not authorized" in lower or "user name" in lower or "refuses" in lower:
@@ -136,6 +143,10 @@ def _cause(trouble: str) -> str:
 
 def _remedy(plan: MqttPlan, trouble: str) -> str:
     lower = trouble.lower()
+    if _is_unresolved(lower):
+        return (
+            f"correct `mqtt: host: {plan.host}` or the name servers of this machine, or write the IP address"
+        )
     if "certificate" in lower or "tls" in lower:
         return "compare port and authorities with the broker's (`mqtt: tls: {ca: ...}`, openssl s_client -connect)"
     if "not authorized" in lower or "user name" in lower or "refuses" in lower:

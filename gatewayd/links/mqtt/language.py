@@ -82,10 +82,10 @@ class MqttLanguage(LinkLanguage):
         return HOSTS.get(writer.by(MqttWriter).mqtt or "", False)
 
     def places_of(self, line: Part[VariableSpec], document: Document) -> bool:
-        """Whether it is published."""
+        """Whether it is published, or may be by a section that cannot be read."""
         section, place = section_of(document), line.spec.by(MqttPlaces).mqtt
         if section is None:
-            return place is not None and place.publish
+            return (place is not None and place.publish) or document.has(KIND.key)
         return section.spec.publish == "all" if place is None else place.publish
 
     def writes_whole(

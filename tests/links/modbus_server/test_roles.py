@@ -79,3 +79,17 @@ def test_a_right_is_part_of_the_fingerprint() -> None:
         compiled("      operator: {write: all, read: all}\n"),
     )
     assert one.cell.fingerprint != other.cell.fingerprint
+
+
+def found(text: str, rule: str) -> int:
+    return sum(each.rule.id == rule for each in load(text.encode(), "cell.yaml").diagnostics)
+
+
+def test_a_listener_with_a_fault_is_not_reported_as_missing() -> None:
+    roles = "      operator: {read: all, write: all}\n"
+    assert found((HEAD + roles + REST).replace("key: /c.key", "key: c.key"), "GW233") == 0
+    assert found(HEAD[: HEAD.index("  tls:")] + "  listen: 127.0.0.1:1502\n" + REST, "GW233") == 2
+
+
+def test_a_range_without_a_right_is_one_finding() -> None:
+    assert found(HEAD + "      operator: {read: all, write: motion}\n" + REST, "GW239") == 1

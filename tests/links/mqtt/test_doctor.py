@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from socket import EAI_NONAME, gaierror
+
+import pytest
 
 from gatewayd.links.examination import Outcome, RunningCell, Surroundings
 from gatewayd.links.mqtt.plan import MqttPlan
@@ -39,6 +42,20 @@ async def test_a_broker_that_refuses(tmp_path: Path) -> None:
 async def test_no_broker() -> None:
     port = free_port()
     assert await looked(port) == [(Outcome.PROBLEM, f"{HOST}:{port}: Connection refused")]
+
+
+async def test_a_name_that_nobody_knows(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def unknown(*_: object) -> None:
+        raise gaierror(EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr("gatewayd.mqtt.client.resolve", unknown)
+    plan = planned()
+    examination = examination_of("mqtt")
+    assert examination is not None
+    mqtt = replace(plan.the(MqttPlan), host="broker.invalid")
+    (seen,) = [each async for each in examination.examine(mqtt, plan.cell, Surroundings())]
+    assert "name" in seen.cause
+    assert "`mqtt: host: broker.invalid`" in seen.remedy
 
 
 async def test_a_running_gateway_is_believed() -> None:

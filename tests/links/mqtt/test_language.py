@@ -111,3 +111,10 @@ def test_an_owner_by_mqtt_needs_a_name_there() -> None:
 def test_grace_is_of_no_use() -> None:
     variables = VARIABLES.replace("timeout: 2s", "timeout: 2s, grace: 1s")
     assert any("`cloud` has `grace`" in message for _slug, message in findings(variables=variables))
+
+
+def test_a_section_with_a_fault_leaves_no_variable_unmapped() -> None:
+    variables = "variables:\n  count: {robot: output_int_register_0}\n"
+    broken = findings("mqtt: {host: 127.0.0.1, topic: plant/press, interval: fast}\n", variables)
+    assert [slug for slug, _ in broken] == ["bad-duration"]
+    assert "unmapped-variable" in [slug for slug, _ in findings("", variables)]

@@ -9,7 +9,7 @@ from gatewayd.links.modbus_server.plan import RoleWriter
 from gatewayd.links.modbus_server.roles import named_by, role_writers
 from gatewayd.links.modbus_server.sections import Modbus, ModbusWriter
 from gatewayd.links.modbus_server.tls_sections import ALL, RoleSpec
-from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Part
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.model import WriterSpec
@@ -79,8 +79,8 @@ def role_without_rights(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW233")
 def role_without_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A writer with a role, and no listener with TLS."""
-    modbus = cell.document.part(Modbus)
-    if modbus is not None and modbus.spec.tls is not None:
+    # One that cannot be read has findings of its own, and to add it would be wrong advice.
+    if "tls" in cell.document.declared("modbus"):
         return
     for writer, role in _by_role(cell):
         message = (
@@ -141,9 +141,11 @@ def owner_without_right(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if spec is None or not spec.write or ALL in spec.write:
             continue
         own = {variable.index for name in spec.write for variable in named_by(name, cell)}
+        reported: set[Position] = set()  # a range on one line has a lock for each of its variables
         for lock in cell.locks:
             missing = [index for index in lock.members if index not in own]
-            if writer.name in lock.owners and not lock.is_any and missing:
+            if writer.name in lock.owners and not lock.is_any and missing and lock.position not in reported:
+                reported.add(lock.position)
                 names = names_and_more(
                     list(dict.fromkeys(cell.variables[index].part.name for index in missing))
                 )
