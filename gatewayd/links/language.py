@@ -43,6 +43,7 @@ class Patience:
     what: str
     """What it does: `the robot program stops`."""
     seconds: float
+    """How long it waits at least after the last moment at which the gateway was there."""
     position: Position
     """Where the mapping says so."""
     remedy: str

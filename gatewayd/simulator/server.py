@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import Protocol, Self, cast
 
 from gatewayd.rtde.codec import ProtocolError
+from gatewayd.simulator.acknowledging import Acknowledging
 from gatewayd.simulator.clock import EARLY, ScaledClock, SimulatorClock, SteppedClock
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.dashboard_server import DashboardServer
@@ -335,6 +336,7 @@ class _Connection(asyncio.Protocol):
         self._number = number
         self._mangler = Mangler(server.faults, number)
         self._blocked_since: float | None = None
+        self._acknowledging = Acknowledging()
         self._room = asyncio.Event()
         self._room.set()
 
@@ -352,9 +354,6 @@ class _Connection(asyncio.Protocol):
         # A small send buffer makes it show soon that a client does not read.
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        limit = self._server.faults.overflow_close
-        if limit is not None:  # a client whose machine lost its power, or its cable, acknowledges nothing
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(limit * 1000))
         if self._server.stepped:
             self._transport.set_write_buffer_limits(0)
         self._write(self._session.greeting())
@@ -436,7 +435,7 @@ class _Connection(asyncio.Protocol):
         except DroppedError as fault:
             self.abort(str(fault))
             return
-        if self._transport.is_closing():
+        if self._transport.is_closing() or self._silent(now):
             return
         if self._transport.get_write_buffer_size():
             self._blocked(now)
@@ -446,6 +445,17 @@ class _Connection(asyncio.Protocol):
             package = self._mangler.mangle(package) if package else self._mangler.flush()
         if package:
             self._line.write(package)
+
+    def _silent(self, now: float) -> bool:
+        """Drop a client whose machine acknowledges nothing: it has lost its power or cable.
+
+        The kernel could do it (TCP_USER_TIMEOUT), but it looks only when it repeats a packet, at pauses that double.
+        """
+        limit = self._server.faults.overflow_close
+        if limit is None or not self._acknowledging.silent(self._socket, now, limit):
+            return False
+        self._overflow(f"has acknowledged nothing for {limit:g} s")
+        return True
 
     def _blocked(self, now: float) -> None:
         limit = self._server.faults.overflow_close

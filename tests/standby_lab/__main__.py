@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from tests.standby_lab.judge import packages, violations
-from tests.standby_lab.lab import Lab, faults, usable
+from tests.standby_lab.lab import FAULTS, Lab, Outcome, faults, usable
 
 
 def main() -> None:
@@ -19,31 +19,27 @@ def main() -> None:
         "--release", type=float, default=1.0, help="seconds until the robot drops a silent client"
     )
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", default="", help="kind of fault")
+    parser.add_argument("--only", default="", choices=FAULTS, help="kind of fault")
     options = parser.parse_args()
     if not usable():
         parser.error("needs root, iproute2, util-linux and keepalived")
-    took: dict[str, list[float]] = {}
-    since: dict[str, list[float]] = {}
+    outcomes: dict[str, list[Outcome]] = {}
     with tempfile.TemporaryDirectory() as directory, Lab(Path(directory), options.release) as lab:
         chosen = [options.only] * options.faults if options.only else faults(options.faults, options.seed)
         for number, fault in enumerate(chosen, 1):
-            released, seconds = lab.do(fault, lab.active())
-            took.setdefault(fault, []).append(seconds)
-            since.setdefault(fault, []).append(seconds - released)
-            print(
-                f"{number:3} {fault:12} served after {seconds * 1000:6.0f} ms, "
-                f"inputs free after {released * 1000:6.0f} ms",
-                flush=True,
-            )
+            outcome = lab.do(fault, lab.active())
+            outcomes.setdefault(fault, []).append(outcome)
+            print(f"{number:3} {outcome}", flush=True)
         lab.active()
         lines = (lab.directory / "robot.jsonl").read_text().splitlines()
-    for fault, times in sorted(took.items()):
-        median, most = statistics.median(times) * 1000, max(times) * 1000
-        longest = max(since[fault]) * 1000
+    for fault, each in sorted(outcomes.items()):
+        times = [outcome.served * 1000 for outcome in each]
+        later = max(outcome.served - outcome.released for outcome in each) * 1000
+        kept = sum(outcome.kept for outcome in each)
         print(
-            f"{fault:12} {len(times):3} times, median {median:6.0f} ms, longest {most:6.0f} ms; "
-            f"longest since the inputs were free {longest:5.0f} ms"
+            f"{fault:12} {len(times):3} times: median {statistics.median(times):6.0f} ms, "
+            f"longest {max(times):6.0f} ms; longest since the inputs were free {later:5.0f} ms; "
+            f"{kept} within {each[0].aim:g} s"
         )
     found = list(violations(lines))
     print(f"judge: {packages(lines)} input packages accepted, {len(found)} violations")

@@ -12,10 +12,12 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
 from gatewayd.control.client import Client, ControlError, NoDaemon
+from tests.standby_lab.supervisor import WATCHDOG
 
 ROOT = Path(__file__).parents[2]
 VIRTUAL, ROBOT = "192.0.2.50", "198.51.100.10"
@@ -233,11 +235,8 @@ class Lab:
                 return float(when)
         return since
 
-    def do(self, fault: str, name: str) -> tuple[float, float]:
-        """Bring the fault about at gateway `name`, which serves.
-
-        Seconds until the robot gave its inputs free, and until the PLC was served by the other gateway.
-        """
+    def do(self, fault: str, name: str) -> Outcome:
+        """Bring the fault about at gateway `name`, which serves, and wait until the PLC is served by the other one."""
         other = next(host for host in HOSTS if host != name)
         hold = self.directory / f"hold-{name}"
         pid, since = self._pid(name), time.monotonic()
@@ -274,7 +273,44 @@ class Lab:
             for bridge in ("plant", "cell"):
                 self.link(name, bridge, up=True)
             hold.unlink(missing_ok=True)
-        return self.released(since) - since, taken[0]
+        return Outcome(fault, self.released(since) - since, taken[0], aim(fault, self.release))
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a fault cost, in seconds since it began."""
+
+    fault: str
+    released: float
+    """Until the robot gave its inputs free."""
+    served: float
+    """Until the first write of the PLC was accepted by the other gateway."""
+    aim: float
+    """Until it has to be."""
+
+    @property
+    def kept(self) -> bool:
+        return self.served <= self.aim
+
+    def __str__(self) -> str:
+        free, after = self.released * 1000, (self.served - self.released) * 1000
+        verdict = "kept" if self.kept else "MISSED"
+        return (
+            f"{self.fault:12} inputs free after {free:6.0f} ms, served after {self.served * 1000:6.0f} ms "
+            f"({after:4.0f} ms later); aim {self.aim * 1000:6.0f} ms: {verdict}"
+        )
+
+
+def aim(fault: str, release: float) -> float:
+    """Seconds within which the PLC has to be served again, for a robot that drops a silent client after `release`."""
+    return {
+        "crash": 2.0,
+        "frozen": WATCHDOG + 1.0,
+        "power": release + 1.0,
+        "cable_robot": release + 1.0,
+        "cable_plant": 2.0,
+        "switch": 0.5,
+    }[fault]
 
 
 FAULTS = ("crash", "frozen", "power", "cable_plant", "cable_robot", "switch")

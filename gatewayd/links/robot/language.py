@@ -122,14 +122,14 @@ class RobotLanguage(DefiningLanguage):
                 )
 
     def patience(self, document: Document) -> Iterable[Patience]:
-        """The robot program, by its watchdog; its call in the generated program waits for two feeds."""
+        """The robot program, by its watchdog: it waits for two feeds, and the first may have been due just then."""
         robot = document.part(RobotSection)
         if robot is not None and robot.spec.watchdog is not None:
             yield Patience(
                 "the robot program stops",
-                WATCHDOG_MARGIN / robot.spec.watchdog.frequency,
+                (WATCHDOG_MARGIN - 1) / robot.spec.watchdog.frequency,
                 robot.key_at("watchdog"),
-                "feed the watchdog less often (`frequency: 1`)",
+                "feed the watchdog less often (`frequency: 0.5`)",
             )
 
     def define(self, line: Part[VariableSpec], document: Document) -> tuple[Sequence[Defined], bool]:

@@ -29,7 +29,7 @@ from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address as address_text
 
 LOOK_PERIOD = 0.05
-"""Seconds between two looks at the addresses of this machine."""
+"""Seconds between two looks at the addresses of this machine; while one is waited for, every call is a look."""
 RETRY_PERIOD = 1.0
 """Seconds between two attempts to have the socket."""
 PEER_READY = 0x100
@@ -123,7 +123,8 @@ class StandbyLink(DutyLink):
     # -- what it sees --------------------------------------------------------------------------------------------
 
     def _look_at_address(self, now: float) -> None:
-        if not self.plan.address or now - self._looked_at < LOOK_PERIOD:
+        is_due = self._station.role is StandbyRole.TAKING_ADDRESS or now - self._looked_at >= LOOK_PERIOD
+        if not self.plan.address or not is_due:
             return
         self._looked_at = now
         try:
@@ -184,10 +185,10 @@ class StandbyLink(DutyLink):
         return Heartbeat(
             role=station.role,
             connected=station.claim is not Claim.NO_SESSION,
-            ready=station.ready(),
+            ready=station.ready(now),
             fingerprint=sight.fingerprint,
             number=sight.number,
-            echo=sight.echo if sight.alive(now) or not sight.last else sight.last.number,
+            echo=sight.echo,
         )
 
     def _turned(self, change: RoleChange) -> None:
@@ -246,7 +247,7 @@ class StandbyLink(DutyLink):
         if station.unaddressed:
             yield (
                 f"the virtual address {self.plan.address} did not come to this machine although the robot was claimed: "
-                "does keepalived run, and follow the file?"
+                "does keepalived run, and follow the file? Then restart this gateway, to be handed cells again"
             )
         if self._files is not None and self._files.trouble:
             yield f"the file {self._files.path} cannot be written: {self._files.trouble}"

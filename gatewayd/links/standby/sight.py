@@ -21,8 +21,7 @@ class Sight:
         self.fingerprint = fingerprint
         self.strange = 0
         """Datagrams that were none of ours, or did not repeat our number."""
-        self.echo = 0
-        """The number of the other gateway, to be repeated to it."""
+        self._named = 0
         self._heard: Heartbeat | None = None
         self._heard_at = -math.inf
         self._refused = False
@@ -32,12 +31,22 @@ class Sight:
         if heartbeat is None or heartbeat.number == self.number:
             self.strange += 1
             return
-        self.echo = heartbeat.number
+        self._named = heartbeat.number
         if heartbeat.echo != self.number:
             # The first datagram after a start of either cannot know our number.
             self.strange += heartbeat.echo != 0
             return
         self._heard, self._heard_at, self._refused = heartbeat, now, False
+
+    @property
+    def echo(self) -> int:
+        """The number to be repeated to the other gateway; 0: none was heard.
+
+        The last one that was believed, whatever was named since: else a forged datagram would make the other gateway
+        believe none of ours. One that has started anew knows nobody yet and repeats our number whoever names it, so
+        that its new number is believed next.
+        """
+        return self._heard.number if self._heard is not None else self._named
 
     def refused(self) -> None:
         """Its machine answered that nobody listens there."""

@@ -30,6 +30,9 @@ LEAVE_FOR = 5.0
 """Seconds for which a gateway that has left does not ask, unless the other serves the cell before."""
 LOST_FOR = 0.5
 """Seconds without a session, while the other gateway has one, after which it is left to that."""
+READY_AFTER = 1.5
+"""Seconds after the start before which the address may not come: keepalived's check for a live process looks once a
+second."""
 TAKEN_FOR = 1.0
 """Seconds for which inputs are in use and no other gateway is seen: it may be our own former connection."""
 
@@ -68,6 +71,7 @@ class StandbyStation:
         self._lost_at = math.inf
         self._taken_at = math.inf
         self._leave = False
+        self._began_at = math.inf
         self._expected_at = -math.inf
         """Since when the address is expected, where it became another one."""
 
@@ -85,10 +89,18 @@ class StandbyStation:
             return "the other gateway is not heard"
         if self.sight.differs:
             return "the mapping of the other gateway differs"
-        return "" if self.sight.ready(now) else "the other gateway is not ready: it does not reach the robot"
+        if self.sight.ready(now):
+            return ""
+        if not self.sight.connected(now):
+            return "the other gateway is not ready: it does not reach the robot"
+        return (
+            "the other gateway is not ready: it has just started, or did not get the address (see its status)"
+        )
 
-    def ready(self) -> bool:
-        """Whether it would take over at once."""
+    def ready(self, now: float) -> bool:
+        """Whether it would take over at once, address included as far as that is known."""
+        if self.has_address and (self.unaddressed or now - self._began_at < READY_AFTER):
+            return False
         return self.role is StandbyRole.STANDING_BY and self.claim not in {Claim.NO_SESSION, Claim.PARTIAL}
 
     def expect_address(self, now: float, *, has_address: bool) -> None:
@@ -102,7 +114,8 @@ class StandbyStation:
         """
         if self.since == -math.inf:
             # The other gateway is to be heard first, if it is there: its mapping may differ.
-            self.since, self._next_try = now, now + GONE_AFTER
+            self.since = self._began_at = now
+            self._next_try = now + GONE_AFTER
         self._note(claim, now)
         held = address if self.has_address else True
         signal = self._signal(claim, held, now)

@@ -34,3 +34,27 @@ def test_grace_is_how_long_adopted_inputs_wait() -> None:
 )
 def test_what_is_wrong_is_said(standby: str, text: str) -> None:
     assert [each.message for each in load(TEXT.format(standby=standby).encode(), "a.yaml").errors] == [text]
+
+
+@pytest.mark.parametrize(
+    "frequency, named",
+    [
+        (10, ["after a crash", "if the process hangs", "if the machine or its cable is gone"]),
+        (1, ["after a crash", "if the process hangs", "if the machine or its cable is gone"]),
+        (0.5, ["if the process hangs", "if the machine or its cable is gone"]),
+        (0.25, ["if the machine or its cable is gone"]),
+        (0.0625, []),
+    ],
+)
+def test_takeovers_that_outlast_the_watchdog_of_the_robot_are_named(
+    frequency: float, named: list[str]
+) -> None:
+    """It waits for two feeds, one of which may have been due when the gateway was lost: 1 / frequency at least."""
+    text = TEXT.format(standby="{peer: '192.0.2.12:2930'}").replace(
+        "{host: 127.0.0.1}",
+        f"{{host: 127.0.0.1, watchdog: {{field: input_int_register_23, frequency: {frequency}}}}}",
+    )
+    found = load(text.encode(), "a.yaml")
+    messages = [each.message for each in found.diagnostics if each.rule.id == "GW886"]
+    cases = ["after a crash", "if the process hangs", "if the machine or its cable is gone"]
+    assert [case for case in cases if any(case in message for message in messages)] == named

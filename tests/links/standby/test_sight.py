@@ -37,6 +37,25 @@ def test_a_gateway_that_has_just_started_is_answered() -> None:
     assert (sight.role(100.0), sight.strange, sight.echo) == (None, 0, THEIRS)
 
 
+def test_a_forged_heartbeat_does_not_change_what_the_other_gateway_hears() -> None:
+    """Who only knows address and port cannot repeat our number, and must not take theirs out of our heartbeats."""
+    sight = seen()
+    sight.heard(replace(SAID, number=666, echo=0), 100.1)
+    sight.heard(replace(SAID, number=667, echo=1), 100.1)
+    assert (sight.echo, sight.strange) == (THEIRS, 1)
+    assert sight.alive(100.2)
+
+
+def test_two_that_knew_each_other_find_each_other_again_when_one_starts_anew() -> None:
+    ours, anew = seen(), Sight(33, 7)
+    anew.heard(replace(SAID, number=OURS, echo=ours.echo), 200.0)
+    assert not anew.alive(200.0)
+    ours.heard(replace(SAID, number=33, echo=anew.echo), 200.0)
+    assert ours.alive(200.0)
+    anew.heard(replace(SAID, number=OURS, echo=ours.echo), 200.1)
+    assert anew.alive(200.1)
+
+
 def test_our_own_words_are_none_of_the_other_gateway() -> None:
     sight = seen(replace(SAID, number=OURS))
     assert (sight.alive(100.0), sight.strange) == (False, 1)

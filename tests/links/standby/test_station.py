@@ -19,6 +19,7 @@ from gatewayd.links.standby.station import (
     JITTER,
     LEAVE_FOR,
     LOST_FOR,
+    READY_AFTER,
     SLOW,
     TAKEN_FOR,
     StandbyStation,
@@ -241,7 +242,14 @@ def test_planned_switch() -> None:
     [
         (None, "the other gateway is not heard"),
         (replace(READY, fingerprint=8), "the mapping of the other gateway differs"),
-        (replace(READY, ready=False), "the other gateway is not ready: it does not reach the robot"),
+        (
+            replace(READY, ready=False, connected=False),
+            "the other gateway is not ready: it does not reach the robot",
+        ),
+        (
+            replace(READY, ready=False),
+            "the other gateway is not ready: it has just started, or did not get the address (see its status)",
+        ),
     ],
 )
 def test_a_switch_to_nobody_is_refused(other: Heartbeat | None, why: str) -> None:
@@ -261,11 +269,32 @@ def test_a_switch_is_made_where_the_cell_is_served() -> None:
 
 def test_who_does_not_reach_the_robot_is_not_ready() -> None:
     rig = Rig(claim=Claim.NO_SESSION)
-    rig.run(1)
-    assert not rig.station.ready()
+    rig.run(READY_AFTER + LOOK)
+    assert not rig.station.ready(rig.now)
     rig.claim = Claim.REFUSED
     rig.run(LOOK)
-    assert rig.station.ready()
+    assert rig.station.ready(rig.now)
+
+
+@pytest.mark.parametrize("has_address", [True, False])
+def test_who_has_just_started_is_ready_when_keepalived_has_seen_it(has_address: bool) -> None:
+    """Its check for a live process looks once a second: before that the address does not come."""
+    rig = Rig(claim=Claim.REFUSED, has_address=has_address)
+    rig.run(1)
+    assert rig.station.ready(rig.now) is not has_address
+    rig.run(READY_AFTER)
+    assert rig.station.ready(rig.now)
+
+
+def test_who_did_not_get_the_address_is_not_ready() -> None:
+    """A planned switch to it would cost as much again."""
+    rig = Rig(other=None, claim=Claim.HELD)
+    rig.run(ADDRESS_WITHIN + 2 * LOOK)
+    assert rig.station.unaddressed
+    rig.other, rig.claim = OTHER, Claim.REFUSED
+    rig.run(1)
+    assert rig.role is StandbyRole.STANDING_BY
+    assert not rig.station.ready(rig.now)
 
 
 EVENTS = st.tuples(

@@ -11,12 +11,15 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.report.format import seconds
 
-AFTER_CRASH = 2.0
-"""Seconds that a takeover takes at most when the process ends: the controller frees the inputs at once."""
-AFTER_FREEZE = 4.0
-"""When the process hangs: the service's watchdog ends it after 2 s."""
-AFTER_CUT = 11.0
-"""When machine or cable are gone: a controller frees the inputs of a silent client after about 10 s."""
+TAKEOVERS = (
+    # The process ends: the controller frees the inputs at once.
+    (2.0, "after a crash"),
+    # The process hangs: the service's watchdog ends it after 2 s.
+    (4.0, "if the process hangs"),
+    # Machine or cable are gone: a controller frees the inputs of a silent client after about 10 s.
+    (11.0, "if the machine or its cable is gone"),
+)
+"""Seconds that a takeover takes at most, and when."""
 
 
 @cell_rule("GW886", Severity.WARNING)
@@ -26,13 +29,13 @@ def standby_outlasts_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagno
     if standby is None:
         return
     for limit in (limit for kind in languages() for limit in kind.patience(cell.document)):
-        if limit.seconds >= AFTER_CRASH:
+        outlasting = [f"{seconds(most)} {when}" for most, when in TAKEOVERS if most > limit.seconds]
+        if not outlasting:
             continue
         message = (
-            f"{limit.what} after {seconds(limit.seconds)} without the gateway, and a takeover takes up to "
-            f"{seconds(AFTER_CRASH)} after a crash, {seconds(AFTER_FREEZE)} if the process hangs, "
-            f"{seconds(AFTER_CUT)} if the machine or its cable is gone"
+            f"{limit.what} as early as {seconds(limit.seconds)} after the gateway is gone, and a takeover takes up to "
+            f"{', '.join(outlasting)}"
         )
         related = (Related(limit.position, "this waits"),)
-        hint = f"{limit.remedy}, or accept that each takeover stops the program"
+        hint = f"{limit.remedy}, or accept that such a takeover stops the program"
         yield rule.at(standby.key, message, hint=hint, related=related)
