@@ -282,7 +282,7 @@ LAYERS: dict[str, set[str]] = {
 
 LIBRARIES: dict[str, set[str]] = {
     "arro3": {"rtde.recording"},
-    "aiohttp": {"control.server", "web.doors", "web.guard", "web.listener"},
+    "aiohttp": {"control.http_log", "control.server", "web.doors", "web.guard", "web.listener"},
     "can": {"canopen.pythoncan", "demo.master"},
     "canopen": {"canopen.importer", "canopen.manager.data_sheet"},
     "click": {"__main__", "cli"},

@@ -21,6 +21,7 @@ from gatewayd.control.access import Caller, Role, local_caller
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.devices import devices_by_hand
 from gatewayd.control.endpoint import Reload
+from gatewayd.control.http_log import HttpLog
 from gatewayd.control.packages import MAX_FEEDS, PackageFeeds
 from gatewayd.control.trace import MAX_TRACES, Traces
 from gatewayd.core.objection import ObjectionKind
@@ -48,8 +49,15 @@ _WRITE_TIME = 30.0
 _PEER_CREDENTIALS = struct.Struct("iII")
 CALLER = web.RequestKey("CALLER", Caller)
 """In a request that came over the network: who asks, if its listener knows."""
-IS_CURRENT: web.RequestKey[Callable[[], bool]] = web.RequestKey("IS_CURRENT")
-"""In such a request: whether an answer without end may go on."""
+CALLER_NOW: web.RequestKey[Callable[[], Caller | None]] = web.RequestKey("CALLER_NOW")
+"""In such a request: who asks, and what it may do, at the moment of the call; None: its token counts no more.
+
+For what takes time: a body that comes slowly, an answer without end.
+"""
+REFUSED: web.RequestKey[Callable[[str], None]] = web.RequestKey("REFUSED")
+"""In such a request: to be called with the reason, a key of the listener's, for which it is refused here."""
+GOT_ON: web.RequestKey[Callable[[], None]] = web.RequestKey("GOT_ON")
+"""In such a request: to be called when the peer has taken a part of an answer without end."""
 PEER = web.RequestKey("PEER", str)
 """In such a request: the address that it came from, which is a proxy's client's where there is a proxy."""
 
@@ -72,7 +80,9 @@ async def serving(listening: socket.socket, api: Api, reload: Reload | None) -> 
     served.router.add_post("/v1/devices/{name}/read", partial(_ask_device, api, devices.read))
     served.router.add_post("/v1/devices/{name}/write", partial(_ask_device, api, devices.write))
     served.middlewares.insert(0, _in_turn(api.share))
-    runner = web.AppRunner(served, access_log=None, handle_signals=False, shutdown_timeout=0.1)
+    runner = web.AppRunner(
+        served, access_log=None, logger=HttpLog(log), handle_signals=False, shutdown_timeout=0.1
+    )
     await runner.setup()
     try:
         await web.SockSite(runner, listening).start()
@@ -210,11 +220,12 @@ class _Routes:
 
         # A follower that is gone, or that leaves too much unread, gets nothing more.
         with suppress(ConnectionError, TimeoutError, Busy):
-            while request.get(IS_CURRENT, _always)():
+            while _is_current(request):
                 if lines or clock.now() - sent_at >= ALIVE_PERIOD:
                     sent_at = clock.now()
                     async with asyncio.timeout(_WRITE_TIME):
                         await response.write(lines.encode() or b"\n")
+                    request.get(GOT_ON, _nothing)()
                 await asyncio.sleep(_FOLLOW_PERIOD)
                 lines = ""
                 if self._api.has_news(cursor, request.query):
@@ -354,8 +365,13 @@ def _in_turn(share: LoopShare) -> Middleware:
     return in_turn
 
 
-def _always() -> bool:
-    return True
+def _is_current(request: web.Request) -> bool:
+    caller_now = request.get(CALLER_NOW)
+    return caller_now is None or caller_now() is not None
+
+
+def _nothing(_reason: str = "") -> None:
+    pass
 
 
 def _moment() -> Moment:
@@ -407,6 +423,8 @@ async def _body(request: web.Request) -> dict[str, Any]:
         raise ApiError(408, "too_slow", f"the body did not arrive within {_BODY_TIME:g} s") from None
     except UnicodeDecodeError:
         raise ApiError(400, "bad_json", "the body is not UTF-8") from None
+    except (LookupError, web.RequestPayloadError):
+        raise ApiError(400, "bad_json", "the body is not encoded as its headers say") from None
     try:
         found = json.loads(text) if text.strip() else {}
     except (ValueError, RecursionError):
@@ -418,8 +436,14 @@ async def _body(request: web.Request) -> dict[str, Any]:
 
 async def _allowed(request: web.Request, role: Role) -> Caller:
     """Who asks, if it has this role. Raises ApiError."""
-    caller: Caller = request.get(CALLER) or await _user(request)
+    caller_now = request.get(CALLER_NOW)
+    caller = await _user(request) if caller_now is None else caller_now()
+    refused = request.get(REFUSED, _nothing)
+    if caller is None:
+        refused("expired_token")
+        raise ApiError(401, "token", "the token was revoked or has expired since the request began")
     if caller.role < role:
+        refused("role")
         log.warning("refused for lack of the role", extra=fields(detail=caller.detail, path=request.path))
         raise ApiError(
             403, "role", f"this needs the role {role.title}; {caller.holder.title} is {caller.role.title}"

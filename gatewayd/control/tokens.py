@@ -33,6 +33,7 @@ _FORMAT = 1
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,31}")
 _HASH = re.compile(r"[0-9a-f]{64}")
 _KEYS = {"name", "role", "sha256", "created", "expires"}
+_LIKE_A_TOKEN = re.compile(rf"{PREFIX}[A-Za-z0-9_-]+")
 _TIME = "%Y-%m-%dT%H:%M:%SZ"
 
 
@@ -124,6 +125,11 @@ def digest_of(text: str) -> str:
     return sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
+def without_tokens(text: str) -> str:
+    """A text that somebody else gave, for the log: what begins as a token is cut off."""
+    return _LIKE_A_TOKEN.sub(f"{PREFIX}...", text)
+
+
 def utc_text(wall: float) -> str:
     """`2026-11-29T14:00:00Z`."""
     return datetime.fromtimestamp(wall, UTC).strftime(_TIME)
@@ -194,7 +200,9 @@ def _token(entry: Any, number: int) -> Token:
 
 def _time(value: object, where: str) -> float:
     try:
-        return datetime.strptime(str(value), _TIME).replace(tzinfo=UTC).timestamp()
+        return (
+            datetime.strptime(value if isinstance(value, str) else "", _TIME).replace(tzinfo=UTC).timestamp()
+        )
     except ValueError:
         raise TokenFileError(f"{where} is not a time like 2026-11-29T14:00:00Z") from None
 

@@ -80,11 +80,16 @@ class ServerIdentity:
     """The TLS context of a server, made anew when its files change. It stays as it is while what they hold is faulty.
 
     `make` gives a context with everything but certificate and key; it may read the files in `further` (authorities,
-    revocations) and raise CertificateError. `refresh` reads files: where a file system may hang, call it in a thread.
+    revocations) and raise CertificateError. `prove` says why nobody could use the context, empty: somebody can.
+    `refresh` reads files: where a file system may hang, call it in a thread.
     """
 
     def __init__(
-        self, files: CertificateFiles, make: Callable[[], ssl.SSLContext], further: Sequence[Path] = ()
+        self,
+        files: CertificateFiles,
+        make: Callable[[], ssl.SSLContext],
+        further: Sequence[Path] = (),
+        prove: Callable[[ssl.SSLContext], str] = lambda _context: "",
     ) -> None:
         self.files = files
         self.context: ssl.SSLContext | None = None
@@ -94,6 +99,7 @@ class ServerIdentity:
         self.fault = ""
         """Why the files as they are now cannot be used; empty: they are what is in use."""
         self._make = make
+        self._prove = prove
         self._watch = FileWatch((files.certificate, files.key, *further))
 
     def refresh(self) -> bool:
@@ -102,10 +108,15 @@ class ServerIdentity:
             return False
         try:
             context = self._make()
-            self.chain, self.context, self.fault = self.files.load(context), context, ""
+            chain = self.files.load(context)
         except CertificateError as error:
             self.fault = str(error)
             return False
+        fault = self._prove(context)
+        if fault:
+            self.fault = f"{self.files.certificate}: {fault}"
+            return False
+        self.chain, self.context, self.fault = chain, context, ""
         return True
 
     def trouble(self, wall: float) -> str:

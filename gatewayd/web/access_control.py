@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from ssl import SSLContext, SSLError
 
 from gatewayd.core.cell import Cell
 from gatewayd.machine.certificates import CertificateFiles, ServerIdentity
@@ -20,6 +21,7 @@ REFUSALS = {
     "expired_token": "with one that has expired",
     "role": "with one whose role is too little",
     "handshake": "TLS handshakes that failed",
+    "malformed": "not HTTP",
     "peer": "connections past the declared proxy",
 }
 """Reason -> what was refused, for the metric."""
@@ -37,7 +39,9 @@ class AccessControl:
         )
         tls = settings.tls
         files = None if tls is None else CertificateFiles(tls.certificate, tls.key)
-        self.identity = ServerIdentity(files, server_context) if files is not None else None
+        self.identity = (
+            ServerIdentity(files, server_context, prove=self._measure) if files is not None else None
+        )
         self.handshake_cost = USUAL_COST
         self.refused = Counter(dict.fromkeys(REFUSALS, 0))
         self.wrong_tokens = WrongTokens()
@@ -46,8 +50,16 @@ class AccessControl:
         """Read what changed of the files. It may wait for a file system: call it in a thread."""
         if self.credentials is not None:
             self.credentials.refresh()
-        if self.identity is not None and self.identity.refresh() and self.identity.context is not None:
-            self.handshake_cost = handshake_cost(self.identity.context)
+        if self.identity is not None:
+            self.identity.refresh()
+
+    def _measure(self, context: SSLContext) -> str:
+        """Note what a handshake costs; why none succeeds, say with a key that no cipher is for. Empty: it does."""
+        try:
+            self.handshake_cost = handshake_cost(context)
+        except SSLError as error:
+            return f"no client can use it: {error.reason}"
+        return ""
 
     @property
     def obstacle(self) -> str:

@@ -8,7 +8,7 @@ until its time, but nothing can be changed by any, so that one that was to be re
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
@@ -67,6 +67,9 @@ class Credentials:
             )
         except TokenFileError as error:
             self.fault = str(error)
+        except Exception as error:
+            self.fault = f"{self.path}: {error}"  # else one that was to be revoked would go on
+            raise
         return True
 
     def identify(self, header: str | None, peer: str, wall: float) -> Caller | Unidentified:
@@ -83,6 +86,13 @@ class Credentials:
         if fault:
             return Unidentified(Judgement.ENDED, fault)
         return network_caller(self._role(token), token.holder, peer, token.expires)
+
+    def current(self, caller: Caller, wall: float) -> Caller | None:
+        """The same caller as its token is now: who may do less meanwhile; None: it counts no more."""
+        if not self.is_current(caller.holder, wall):
+            return None
+        token = next(token for token in self.tokens.tokens if token.holder == caller.holder)
+        return replace(caller, role=self._role(token))
 
     def is_current(self, holder: Holder, wall: float) -> bool:
         """Whether this token still counts."""

@@ -22,12 +22,14 @@ from gatewayd.loop import clock
 from gatewayd.loop.share import Busy, LoopShare
 from gatewayd.web.access_control import AccessControl
 from gatewayd.web.encryption import HANDSHAKE_TIME
-from gatewayd.web.hosts import normal_address
+from gatewayd.web.hosts import network_of, normal_address
 
 MAX_CONNECTIONS = 32
 """Open at a time; further ones are closed at once, so that a flood costs the robot's loop next to nothing."""
 FAIR = 8
 """Connections of one peer that nobody takes from it. It may have more while there is room."""
+UNKNOWN_TIME = 2.0
+"""Seconds that a connection has for a request with a token, before it may lose its place to a newcomer."""
 PATIENCE = 20.0
 """Seconds after which a connection that has not finished a request is closed: idle, slow, or not reading its answer."""
 _SWEEP = 2.0
@@ -66,7 +68,7 @@ class Doors:
         if len(self._seen) >= MAX_CONNECTIONS and not self._make_room(visit.peer):
             transport.abort()
             return
-        self._seen[visit] = clock.now()
+        self._seen[visit] = visit.begun
         if self._access.identity is None:
             visit.serve(self._server(), transport)
             return
@@ -75,11 +77,12 @@ class Doors:
         self._handshakes.add(task)
         task.add_done_callback(self._handshakes.discard)
 
-    def finished(self, handler: RequestHandler) -> None:
-        """A request of the connection was answered."""
+    def got_on(self, handler: RequestHandler, *, is_known: bool) -> None:
+        """A request of the connection was answered, or a part of an answer without end; `is_known`: with a token."""
         for visit in self._seen:
             if visit.handler is handler:
                 self._seen[visit] = clock.now()
+                visit.is_known = is_known
 
     async def sweep(self) -> None:
         """Close what wastes a connection, until cancelled."""
@@ -135,18 +138,27 @@ class Doors:
     def _make_room(self, peer: str) -> bool:
         """The peer with the most connections, if they are more than `FAIR`, loses the one answered longest ago.
 
-        Only to one who has fewer than that, so that nobody drives out himself again and again.
+        Only to one who has fewer than that, so that nobody drives out himself again and again. Where nobody has
+        more, many may keep others out together: then one goes that has not shown a token in time.
         """
         of_peer: defaultdict[str, list[_Visit]] = defaultdict(list)
         for visit in self._seen:
-            of_peer[visit.peer].append(visit)
+            of_peer[network_of(visit.peer)].append(visit)
         most = max(of_peer.values(), key=len)
-        if len(most) <= FAIR or len(of_peer[peer]) >= FAIR:
+        if len(of_peer[network_of(peer)]) >= FAIR:
             return False
-        longest = min(most, key=self._seen.__getitem__)
-        del self._seen[longest]
-        longest.abort()
+        leaving_one_of = most if len(most) > FAIR else list(filter(self._is_unknown, self._seen))
+        if not leaving_one_of:
+            return False
+        leaving = min(leaving_one_of, key=self._seen.__getitem__)
+        del self._seen[leaving]
+        leaving.abort()
         return True
+
+    def _is_unknown(self, visit: _Visit) -> bool:
+        """Whether it has shown no token for so long that it need not have come. On this machine none is needed."""
+        since = self._seen[visit] if self._access.settings.is_local else visit.begun
+        return not visit.is_known and clock.now() - since >= UNKNOWN_TIME
 
     def _forget_closed(self) -> None:
         for visit in [visit for visit in self._seen if visit.is_closed]:
@@ -160,6 +172,9 @@ class _Visit(asyncio.Protocol):
         self.transport: asyncio.Transport | None = None
         self.handler: RequestHandler | None = None
         self.peer = ""
+        self.begun = clock.now()
+        self.is_known = False
+        """Whether its last request came with a token that counts."""
         self._come_in = come_in
         self._is_lost = False
         self._early = bytearray()

@@ -16,12 +16,13 @@ from aiohttp import web
 from aiohttp.typedefs import Middleware
 
 from gatewayd.control.access import Caller
-from gatewayd.control.server import CALLER, IS_CURRENT, PEER, asker
+from gatewayd.control.server import CALLER, CALLER_NOW, GOT_ON, PEER, REFUSED, asker
+from gatewayd.control.tokens import without_tokens
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.loop.share import Busy, LoopShare
 from gatewayd.web.access_control import AccessControl
-from gatewayd.web.credentials import ASK, Judgement
+from gatewayd.web.credentials import ASK, Judgement, Unidentified
 from gatewayd.web.doors import Doors
 from gatewayd.web.hosts import forwarded_peer, is_from_elsewhere, is_ours, normal_address
 
@@ -98,6 +99,9 @@ class Guard:
         self._access.refused["no_token"] += 1
         return _Refusal(401, ASK)
 
+    def _count(self, reason: str) -> None:
+        self._access.refused[reason] += 1
+
     async def wait(self, refusal: _Refusal) -> None:
         """Let a wrong token wait for its answer."""
         if refusal.delay:
@@ -112,7 +116,7 @@ class Guard:
         peer, proxy = normal_address(request.remote or ""), self._access.settings.proxy
         if proxy is None or peer != normal_address(proxy):
             return peer
-        return forwarded_peer(request.headers.get("X-Forwarded-For")) or peer
+        return forwarded_peer(request.headers.getall("X-Forwarded-For", [])) or peer
 
     def _wrong_name(self, request: web.Request) -> _Refusal | None:
         hosts = request.headers.getall("Host", [])
@@ -130,7 +134,8 @@ class Guard:
         if request.method in _READING and request.path not in STREAMS:
             return None
         headers = request.headers
-        if is_from_elsewhere(headers.get("Origin"), headers.get("Sec-Fetch-Site"), headers["Host"]):
+        origins, sites = headers.getall("Origin", []), headers.getall("Sec-Fetch-Site", [])
+        if is_from_elsewhere(origins, sites, headers["Host"]):
             self._access.refused["origin"] += 1
             return _Refusal(403, "this was sent by a page of another site")
         return None
@@ -144,28 +149,31 @@ class Guard:
         found = credentials.identify(header, peer, time.time())
         if isinstance(found, Caller):
             request[CALLER] = found
-            request[IS_CURRENT] = lambda: credentials.is_current(found.holder, time.time())
+            request[REFUSED] = self._count
+            request[CALLER_NOW] = lambda: credentials.current(found, time.time())
             return None
         self._access.refused[_JUDGED[found.judgement]] += 1
-        if found.judgement is Judgement.WRONG:
-            delay = self._wrong_token(request, peer)
-            if self._delayed >= MAX_DELAYED:
-                return _Refusal(429, "too many wrong tokens at once: try again later")
-            return _Refusal(401, found.text, delay)
-        if found.judgement is Judgement.ENDED:
-            log.warning(
-                "a token that counts no more",
-                extra=fields(peer=peer, path=request.path[:MAX_PATH], reason=found.text),
-            )
-        return _Refusal(401, found.text)
+        if found.judgement is Judgement.NONE:
+            return _Refusal(401, found.text)
+        delay = self._wrong_token(request, peer, found)
+        if self._delayed >= MAX_DELAYED:
+            return _Refusal(429, "too many wrong tokens at once: try again later")
+        return _Refusal(401, found.text, delay)
 
-    def _wrong_token(self, request: web.Request, peer: str) -> float:
+    def _wrong_token(self, request: web.Request, peer: str, found: Unidentified) -> float:
+        """Another one, or one that counts no more: seconds that its answer waits."""
         count, delay = self._access.wrong_tokens.wrong(peer, clock.now())
         if count <= _LOGGED or count.bit_count() == 1:
-            log.warning(
-                "a request without the right token",
-                extra=fields(peer=peer, path=request.path[:MAX_PATH], times=count),
-            )
+            path = without_tokens(request.path[:MAX_PATH])
+            if found.judgement is Judgement.WRONG:
+                log.warning(
+                    "a request without the right token", extra=fields(peer=peer, path=path, times=count)
+                )
+            else:
+                log.warning(
+                    "a token that counts no more",
+                    extra=fields(peer=peer, path=path, reason=found.text, times=count),
+                )
         return delay
 
 
@@ -174,7 +182,10 @@ def middleware(guard: Guard, doors: Callable[[], Doors | None], share: LoopShare
 
     @web.middleware
     async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
-        refusal = guard.judge(request)
+        refusal, entrance = guard.judge(request), doors()
+        is_known = CALLER in request
+        if entrance is not None:
+            request[GOT_ON] = lambda: entrance.got_on(request.protocol, is_known=is_known)
         try:
             if refusal is not None or request.method in _READING:
                 await share.request(asker(request))
@@ -190,9 +201,8 @@ def middleware(guard: Guard, doors: Callable[[], Doors | None], share: LoopShare
             response = _plain(503, "too many requests at once: try again later, and less often")
         for name, value in HEADERS.items():
             response.headers.setdefault(name, value)
-        entrance = doors()
         if entrance is not None:
-            entrance.finished(request.protocol)
+            request[GOT_ON]()
         return response
 
     return guarded

@@ -8,8 +8,8 @@ changes anything must come from our own page or from no page at all.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
-from ipaddress import ip_address
+from collections.abc import Collection, Sequence
+from ipaddress import IPv6Address, ip_address, ip_network
 
 from gatewayd.web.settings import is_loopback
 
@@ -41,17 +41,19 @@ def is_ours(host: str, names: Collection[str], own_addresses: Collection[str]) -
     return is_loopback(name) or name.endswith(".localhost") or name in names or name in own_addresses
 
 
-def is_from_elsewhere(origin: str | None, fetch_site: str | None, host: str) -> bool:
-    """Whether a request was made by a page of another site: by its Origin header (RFC 6454) and Sec-Fetch-Site.
+def is_from_elsewhere(origins: Sequence[str], fetch_sites: Sequence[str], host: str) -> bool:
+    """Whether a request was made by a page of another site: by its Origin (RFC 6454) and Sec-Fetch-Site headers.
 
-    A program sends neither.
+    A program sends neither. Of several of one name, which no browser sends, every one has to be ours.
     """
-    if fetch_site is not None and fetch_site not in _FROM_HERE:
-        return True
-    if origin is None:
-        return False
+    return any(site not in _FROM_HERE for site in fetch_sites) or not all(
+        _is_page_of(origin, host) for origin in origins
+    )
+
+
+def _is_page_of(origin: str, host: str) -> bool:
     scheme, separator, rest = origin.partition("://")
-    return not separator or scheme not in ("http", "https") or rest.lower() != host.lower()
+    return bool(separator) and scheme in ("http", "https") and rest.lower() == host.lower()
 
 
 def normal_address(address: str) -> str:
@@ -64,15 +66,26 @@ def normal_address(address: str) -> str:
     return str(mapped or found)
 
 
-def forwarded_peer(header: str | None) -> str | None:
-    """The address that a trusted proxy saw: the last one of X-Forwarded-For; those before it anybody may have sent."""
-    if header is None:
-        return None
-    last = header.rpartition(",")[2].strip()
+def forwarded_peer(headers: Sequence[str]) -> str | None:
+    """The address that a trusted proxy saw: the last one of X-Forwarded-For; those before it anybody may have sent.
+
+    Also where it stands in a header of its own below the client's, as some proxies add it (RFC 9110, 5.3).
+    """
+    last = headers[-1].rpartition(",")[2].strip() if headers else ""
     try:
         return normal_address(str(ip_address(last)))
     except ValueError:
         return None
+
+
+def network_of(peer: str) -> str:
+    """Whom a peer counts as: an IPv4 address, or an IPv6 network of 64 bits, which one machine has as a whole."""
+    address = normal_address(peer)
+    try:
+        found = ip_address(address)
+    except ValueError:
+        return peer
+    return str(ip_network((found, 64), strict=False)) if isinstance(found, IPv6Address) else address
 
 
 def _normal(address: str) -> str | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 RETRY_PERIOD = 2.0
 FILES_PERIOD = 0.5
 """Seconds between two looks at tokens and certificates: how long a revoked token may go on at most."""
+ENDING_PERIOD = 0.25
+"""Seconds between two looks at what tokens hold."""
 _LOOK = 0.05
 
 log = logging.getLogger("gatewayd.status")
@@ -44,7 +46,11 @@ async def serve(
 ) -> None:
     """Measure and listen until cancelled. An address that cannot be had is said once and tried again."""
     probes = Probes(daemon, notes, remarks)
-    beside = [asyncio.create_task(probes.run()), asyncio.create_task(_keep_up(access))]
+    beside = [
+        asyncio.create_task(probes.run()),
+        asyncio.create_task(_keep(lambda: _follow_files(access))),
+        asyncio.create_task(_keep(lambda: _end_what_ended(access))),
+    ]
     try:
         await _until_serving(daemon)
         await keep_running(
@@ -61,12 +67,20 @@ async def serve(
                 await task
 
 
-async def _keep_up(access: AccessControl) -> None:
-    """Read tokens and certificates again when they change, and end what tokens hold that count no more."""
-    await keep_running(lambda: _follow_files(access), log, RETRY_PERIOD)
+async def _keep(work: Callable[[], Awaitable[None]]) -> None:
+    await keep_running(work, log, RETRY_PERIOD)
+
+
+async def _end_what_ended(access: AccessControl) -> None:
+    """End what tokens hold that count no more. Apart from the files, which may be on a file system that hangs."""
+    while access.credentials is not None:
+        for ended in access.credentials.end_what_ended(clock.now(), time.time()):
+            log.warning("what a token held has ended", extra=fields(reason=ended))
+        await asyncio.sleep(ENDING_PERIOD)
 
 
 async def _follow_files(access: AccessControl) -> None:
+    """Read tokens and certificates again when they change, and report what somebody has to do about them."""
     said: set[str] = set()
     while True:
         await in_daemon_thread(access.refresh, "status listener files")
@@ -74,9 +88,6 @@ async def _follow_files(access: AccessControl) -> None:
         for trouble in sorted(troubles - said):
             log.warning("the status listener needs attention", extra=fields(reason=trouble))
         said = troubles
-        if access.credentials is not None:
-            for ended in access.credentials.end_what_ended(clock.now(), time.time()):
-                log.warning("what a token held has ended", extra=fields(reason=ended))
         await asyncio.sleep(FILES_PERIOD)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import gzip
+import logging
 from collections.abc import Awaitable, Callable, Generator
 from contextlib import suppress
 from importlib.resources import files
@@ -18,6 +19,7 @@ from gatewayd import __version__
 from gatewayd.control.access import Caller
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Reload
+from gatewayd.control.http_log import HttpLog
 from gatewayd.control.server import CALLER, application, asker
 from gatewayd.loop import clock
 from gatewayd.loop.share import LoopShare, in_one_step
@@ -52,6 +54,8 @@ _WORTH_PACKING = 2048
 _CLOSING_TIME = 0.5
 
 _Result = TypeVar("_Result")
+
+log = logging.getLogger("gatewayd.status")
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -93,7 +97,12 @@ class StatusListener:
     async def start(self) -> None:
         """Listen. Raises OSError."""
         runner = web.AppRunner(
-            self._app, access_log=None, keepalive_timeout=15.0, handle_signals=False, lingering_time=1.0
+            self._app,
+            access_log=None,
+            logger=HttpLog(log, self._malformed),
+            keepalive_timeout=15.0,
+            handle_signals=False,
+            lingering_time=1.0,
         )
         await runner.setup()
         assert runner.server is not None
@@ -102,6 +111,9 @@ class StatusListener:
         self._server = await loop.create_server(doors, self._host, self._port, backlog=MAX_CONNECTIONS)
         self._doors, self._runner = doors, runner
         self._sweeper = loop.create_task(doors.sweep())
+
+    def _malformed(self) -> None:
+        self._access.refused["malformed"] += 1
 
     async def close(self) -> None:
         """Stop listening and end all connections."""

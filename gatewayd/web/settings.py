@@ -49,7 +49,7 @@ class Settings:
     def own_names(self) -> tuple[str, ...]:
         """What clients may call the listener beside the address of their connection."""
         everywhere = _is_address(self.host) and ip_address(self.host).is_unspecified
-        return self.names if everywhere else (self.host.lower(), *self.names)
+        return self.names if everywhere else (_usual(self.host), *self.names)
 
     @property
     def obstacle(self) -> str:
@@ -77,7 +77,7 @@ def settings(  # noqa: PLR0917 - one for each option
     if (certificate is None) != (key is None):
         raise SettingsError("--status-certificate and --status-key belong together: give both, or neither")
     tls = TlsFiles(certificate, key) if certificate is not None and key is not None else None
-    known = tuple(name.lower() for name in names)
+    known = tuple(_usual(name) for name in names)
     for name in known:
         if not _NAME.fullmatch(name) and not _is_address(name):
             raise SettingsError(f"--status-name {name}: not a name or an address, without port and scheme")
@@ -102,6 +102,11 @@ def is_loopback(host: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def _usual(name: str) -> str:
+    """A name or an address as it is compared with what a client says."""
+    return str(ip_address(name)) if _is_address(name) else name.lower()
 
 
 def _is_address(text: str) -> bool:

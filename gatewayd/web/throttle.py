@@ -8,7 +8,8 @@ guesses 256 bits. What the delay is for: guesses stay few, cheap and visible.
 from __future__ import annotations
 
 from collections import OrderedDict
-from ipaddress import IPv6Address, ip_address, ip_network
+
+from gatewayd.web.hosts import network_of
 
 FIRST_DELAY = 0.25
 """Seconds that the first wrong token waits for its answer; each further one twice as long."""
@@ -28,7 +29,7 @@ class WrongTokens:
 
     def wrong(self, peer: str, now: float) -> tuple[int, float]:
         """Another one: how many that makes of this peer, and the seconds for which its answer waits."""
-        key = _key(peer)
+        key = network_of(peer)
         count, last = self._peers.pop(key, (0, now))
         count = 1 if now - last >= FORGET_AFTER else count + 1
         self._peers[key] = count, now
@@ -38,13 +39,3 @@ class WrongTokens:
 
     def __len__(self) -> int:
         return len(self._peers)
-
-
-def _key(peer: str) -> str:
-    try:
-        address = ip_address(peer.partition("%")[0])
-    except ValueError:
-        return peer
-    if isinstance(address, IPv6Address) and address.ipv4_mapped is None:
-        return str(ip_network((address, 64), strict=False))
-    return str(address)

@@ -235,6 +235,96 @@ async def test_hostile_headers_are_refused(
     assert b"Traceback" not in answer
 
 
+async def test_no_token_is_in_the_log_whatever_the_request_is(
+    listener: StatusListener, authority: Authority, network: AccessControl, caplog: pytest.LogCaptureFixture
+) -> None:
+    """aiohttp quotes a header that it cannot read, in the answer and in what it logs."""
+    caplog.set_level("INFO")
+    secret = b"gatewayd_" + 30 * b"s"
+    for head in (
+        b"Authorization: Bearer " + secret + b"\x00\r\n",
+        b"Authorization : Bearer " + secret + b"\r\n",
+        b"Authorization: Bearer " + 300 * secret + b"\r\n",
+    ):
+        answer = await raw(
+            listener, authority, b"GET /metrics HTTP/1.1\r\nHost: localhost\r\n" + head + b"\r\n"
+        )
+        assert answer[9:12] == b"400", answer
+    assert network.refused["malformed"] == 3
+    line = b"GET /%b HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer x\r\nConnection: close\r\n\r\n"
+    assert (await raw(listener, authority, line % secret))[9:12] == b"401"
+    logged = caplog.text + str([vars(record) for record in caplog.records])
+    assert "gatewayd_..." in logged
+    assert "sss" not in logged
+
+
+@pytest.mark.parametrize("header", ["Content-Encoding: gzip", "Content-Type: text/plain; charset=nonsense"])
+async def test_a_body_that_is_not_encoded_as_it_says_is_refused(
+    listener: StatusListener, authority: Authority, caplog: pytest.LogCaptureFixture, header: str
+) -> None:
+    request = (
+        "POST /api/v1/locks/spare/take HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+        f"Authorization: Bearer {TOKEN}\r\n{header}\r\nContent-Length: 5\r\n\r\nZZZZZ"
+    )
+    answer = await raw(listener, authority, request.encode())
+    assert answer[9:12] == b"400", answer
+    assert "ERROR" not in caplog.text
+
+
+async def test_a_token_that_is_revoked_while_its_request_arrives_does_nothing(
+    listener: StatusListener, authority: Authority, network: AccessControl, tokens: Path, cell: Cell
+) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", listener.port, ssl=trusting(authority))
+    head = (
+        "POST /api/v1/variables/cycles/force HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+        f"Authorization: Bearer {TOKEN}\r\nExpect: 100-continue\r\nContent-Length: 23\r\n\r\n"
+    )
+    writer.write(head.encode())
+    assert b"100 Continue" in await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), 10)
+    await asyncio.sleep(0.05)  # its header was judged
+    write_tokens(tokens)
+    network.refresh()
+    writer.write(b'{"value": 1, "for": 60}')
+    answer = await asyncio.wait_for(reader.read(), 10)
+    writer.close()
+    assert answer[9:12] == b"401", answer
+    assert b"revoked" in answer
+    assert not cell.forcing.forces
+    assert network.refused["expired_token"] == 1
+
+
+async def test_what_a_role_may_not_do_is_counted(
+    session: aiohttp.ClientSession, network: AccessControl
+) -> None:
+    assert await ask(session, "POST", "/api/v1/locks/spare/take", VIEWER) == 403
+    assert network.refused["role"] == 1
+
+
+async def test_an_expired_token_is_slowed_down_and_logged_less_and_less(
+    session: aiohttp.ClientSession, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A program that nobody gave a new one asks for years."""
+    monkeypatch.setattr(guard, "MAX_DELAYED", 0)
+    for _ in range(20):
+        assert await ask(session, "GET", "/metrics", OLD) == 429
+    assert caplog.text.count("counts no more") == 6
+
+
+async def test_a_stream_goes_on_for_as_long_as_it_is_read(
+    session: aiohttp.ClientSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doors, "PATIENCE", 0.3)
+    monkeypatch.setattr(doors, "_SWEEP", 0.05)
+    monkeypatch.setattr("gatewayd.control.server.ALIVE_PERIOD", 0.1)
+    headers = {"Authorization": f"Bearer {VIEWER}"}
+    begun = time.monotonic()
+    async with session.get("/api/v1/events?follow=1", headers=headers) as response:
+        async for _line in response.content:
+            if time.monotonic() - begun > 1.0:
+                return
+    pytest.fail("the stream was ended")
+
+
 async def test_a_stream_ends_with_its_token(
     session: aiohttp.ClientSession, network: AccessControl, tokens: Path
 ) -> None:
@@ -317,6 +407,20 @@ async def test_plain_http_is_not_answered(listener: StatusListener, network: Acc
         assert b"HTTP" not in await asyncio.wait_for(reader.read(), 10)
     writer.close()
     assert network.refused["handshake"] == 1
+
+
+def test_a_certificate_that_no_client_can_use_leaves_the_former_one(network: AccessControl) -> None:
+    """OpenSSL takes a key of this curve without complaint, and then has no cipher for it."""
+    assert OPENSSL is not None
+    assert network.identity is not None
+    network.refresh()
+    former, files = network.identity.context, network.identity.files
+    key = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:secp256k1", "-nodes", "-keyout", str(files.key))
+    command = [OPENSSL, "req", "-x509", *key, "-subj", "/CN=gateway", "-out", str(files.certificate)]
+    subprocess.run(command, check=True, capture_output=True)
+    network.refresh()
+    assert "no client can use it" in network.identity.fault
+    assert network.identity.context is former
 
 
 async def test_another_certificate_is_presented_without_a_restart(

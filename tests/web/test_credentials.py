@@ -68,6 +68,37 @@ def test_whatever_else_is_given_is_nobody(
     assert TOKEN not in found.text
 
 
+def test_who_is_known_is_judged_again_as_the_file_is_now(credentials: Credentials, file: Path) -> None:
+    anna, bert = (known(credentials, f"Bearer {text}") for text in (TOKEN, "another"))
+    assert isinstance(anna, Caller)
+    assert isinstance(bert, Caller)
+    assert credentials.current(anna, time.time()) == anna
+    assert credentials.current(anna, time.time() + 7200) is None, "it has expired"
+    write_tokens(file, BERT)
+    credentials.refresh()
+    assert credentials.current(anna, time.time()) is None
+    file.write_text("damaged")
+    credentials.refresh()
+    found = credentials.current(bert, time.time())
+    assert found is not None
+    assert found.role is Role.VIEWER
+
+
+def test_a_file_whose_reading_fails_in_an_unforeseen_way_leaves_nobody_acting(
+    credentials: Credentials, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_path: Path) -> None:
+        raise RuntimeError("a defect")
+
+    write_tokens(file, ANNA)
+    monkeypatch.setattr("gatewayd.web.credentials.read_tokens", fail)
+    with pytest.raises(RuntimeError):
+        credentials.refresh()
+    found = known(credentials, f"Bearer {TOKEN}")
+    assert isinstance(found, Caller)
+    assert found.role is Role.VIEWER
+
+
 def test_a_revoked_token_ends_what_it_holds_and_nothing_else(
     credentials: Credentials, file: Path, cell: Cell
 ) -> None:

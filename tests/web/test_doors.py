@@ -8,6 +8,7 @@ import pytest
 
 from gatewayd.web import doors
 from gatewayd.web.listener import StatusListener
+from tests.web.press import TOKEN
 
 HEALTHZ = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 HEALTHZ_ONCE = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
@@ -39,6 +40,26 @@ async def test_connections_are_bounded_and_come_back(listener: StatusListener) -
     async with asyncio.timeout(10):
         while not (await raw(listener.port, HEALTHZ_ONCE)).startswith(b"HTTP/1.1 200"):  # noqa: ASYNC110 - nobody signals it
             await asyncio.sleep(0.02)
+
+
+async def test_many_peers_without_a_token_keep_nobody_out_together(
+    listener: StatusListener, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody of them has more than its share, and each holds what it has: then who has shown no token goes."""
+    monkeypatch.setattr(doors, "UNKNOWN_TIME", 0.2)
+    reader, known = await asyncio.open_connection("127.0.0.1", listener.port, local_addr=("127.0.0.9", 0))
+    known.write(HEALTHZ.replace(b"\r\n\r\n", b"\r\nAuthorization: Bearer " + TOKEN.encode() + b"\r\n\r\n"))
+    assert (await asyncio.wait_for(reader.readuntil(b"}"), 10)).startswith(b"HTTP/1.1 200")
+    sources = [f"127.0.0.{2 + number // doors.FAIR}" for number in range(doors.MAX_CONNECTIONS - 1)]
+    many = [await connect(listener, source) for source in sources]
+    assert await raw(listener.port, HEALTHZ_ONCE) == b""
+    async with asyncio.timeout(10):
+        while not (await raw(listener.port, HEALTHZ_ONCE)).startswith(b"HTTP/1.1 200"):  # noqa: ASYNC110 - nobody signals it
+            await asyncio.sleep(0.02)
+    known.write(HEALTHZ)
+    assert b"200 OK" in await asyncio.wait_for(reader.readuntil(b"}"), 10)
+    for writer in (known, *many):
+        writer.close()
 
 
 async def test_one_peer_keeps_nobody_out(listener: StatusListener) -> None:

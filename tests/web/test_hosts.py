@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.web.hosts import forwarded_peer, is_from_elsewhere, is_ours, name_of, normal_address
+from gatewayd.web.hosts import forwarded_peer, is_from_elsewhere, is_ours, name_of, network_of, normal_address
 
 
 @pytest.mark.parametrize(
@@ -69,23 +69,30 @@ def test_only_declared_names_and_own_addresses_are_ours(host: str, ours: bool) -
     ],
 )
 def test_pages_of_other_sites_change_nothing(origin: str | None, site: str | None, foreign: bool) -> None:
-    assert is_from_elsewhere(origin, site, "gw1:9502") is foreign
+    origins, sites = ([] if one is None else [one] for one in (origin, site))
+    assert is_from_elsewhere(origins, sites, "gw1:9502") is foreign
+
+
+def test_of_several_origins_each_has_to_be_ours() -> None:
+    assert is_from_elsewhere(["https://gw1:9502", "https://evil.example"], [], "gw1:9502")
+    assert is_from_elsewhere([], ["same-origin", "cross-site"], "gw1:9502")
 
 
 @pytest.mark.parametrize(
-    "header, peer",
+    "headers, peer",
     [
-        (None, None),
-        ("192.0.2.7", "192.0.2.7"),
-        ("198.51.100.1, 192.0.2.7", "192.0.2.7"),
-        ("192.0.2.7, unknown", None),
-        ("", None),
-        ("192.0.2.7:1234", None),
-        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ([], None),
+        (["192.0.2.7"], "192.0.2.7"),
+        (["198.51.100.1, 192.0.2.7"], "192.0.2.7"),
+        (["198.51.100.1", "192.0.2.7"], "192.0.2.7"),
+        (["192.0.2.7, unknown"], None),
+        (["192.0.2.7", ""], None),
+        (["192.0.2.7:1234"], None),
+        (["::ffff:192.0.2.7"], "192.0.2.7"),
     ],
 )
-def test_of_what_a_proxy_forwards_only_its_own_word_counts(header: str | None, peer: str | None) -> None:
-    assert forwarded_peer(header) == peer
+def test_of_what_a_proxy_forwards_only_its_own_word_counts(headers: list[str], peer: str | None) -> None:
+    assert forwarded_peer(headers) == peer
 
 
 def test_addresses_are_compared_in_one_form() -> None:
@@ -97,5 +104,6 @@ def test_addresses_are_compared_in_one_form() -> None:
 @given(st.text(max_size=80), st.text(max_size=80))
 def test_whatever_the_headers_are(host: str, origin: str) -> None:
     is_ours(host, {"gw1"}, ())
-    is_from_elsewhere(origin, None, host)
-    forwarded_peer(origin)
+    is_from_elsewhere([origin], [host], host)
+    forwarded_peer([host, origin])
+    network_of(host)
