@@ -42,6 +42,8 @@ class Caller:
     """As events and audit have it: `by anna`, `by token anna from 192.0.2.7`."""
     expires: float | None = None
     """Seconds since 1970 at which its token ends; None: not by itself."""
+    reduced: str = ""
+    """Why it may do less now than its token says; empty: it is as it says."""
 
 
 def local_caller(user: str) -> Caller:

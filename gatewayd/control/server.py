@@ -445,9 +445,8 @@ async def _allowed(request: web.Request, role: Role) -> Caller:
     if caller.role < role:
         refused("role")
         log.warning("refused for lack of the role", extra=fields(detail=caller.detail, path=request.path))
-        raise ApiError(
-            403, "role", f"this needs the role {role.title}; {caller.holder.title} is {caller.role.title}"
-        )
+        lack = caller.reduced or f"{caller.holder.title} is {caller.role.title}"
+        raise ApiError(403, "role", f"this needs the role {role.title}; {lack}")
     return caller
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from gatewayd.control.access import Caller, Role, network_caller
 from gatewayd.control.token_file import read_tokens
-from gatewayd.control.tokens import Token, TokenFileError, TokenSet
+from gatewayd.control.tokens import TokenFileError, TokenSet
 from gatewayd.core.cell import Cell
 from gatewayd.core.forcing import Holder
 from gatewayd.machine.certificates import FileWatch
@@ -38,6 +38,7 @@ class Unidentified:
 
 
 ASK = "this needs a token: Authorization: Bearer TOKEN"
+_UNREADABLE = "while the gateway cannot read its file of tokens, all of them only read; its log says why"
 _WRONG = Unidentified(
     Judgement.WRONG, "the token is not one of the gateway's; gatewayd token list shows who has one"
 )
@@ -85,14 +86,14 @@ class Credentials:
         fault = token.fault(wall)
         if fault:
             return Unidentified(Judgement.ENDED, fault)
-        return network_caller(self._role(token), token.holder, peer, token.expires)
+        return self._as_it_may(network_caller(token.role, token.holder, peer, token.expires))
 
     def current(self, caller: Caller, wall: float) -> Caller | None:
         """The same caller as its token is now: who may do less meanwhile; None: it counts no more."""
         if not self.is_current(caller.holder, wall):
             return None
         token = next(token for token in self.tokens.tokens if token.holder == caller.holder)
-        return replace(caller, role=self._role(token))
+        return self._as_it_may(replace(caller, role=token.role, reduced=""))
 
     def is_current(self, holder: Holder, wall: float) -> bool:
         """Whether this token still counts."""
@@ -126,6 +127,6 @@ class Credentials:
         known = next((token for token in self.tokens.tokens if token.holder == holder), None)
         return known.fault(wall) if known is not None else f"the token {holder.name} was revoked"
 
-    def _role(self, token: Token) -> Role:
+    def _as_it_may(self, caller: Caller) -> Caller:
         """While the file cannot be read, nobody knows who was to be revoked."""
-        return min(token.role, Role.VIEWER) if self.fault else token.role
+        return replace(caller, role=Role.VIEWER, reduced=_UNREADABLE) if self.fault else caller

@@ -82,6 +82,10 @@ def test_who_is_known_is_judged_again_as_the_file_is_now(credentials: Credential
     found = credentials.current(bert, time.time())
     assert found is not None
     assert found.role is Role.VIEWER
+    assert "cannot read its file" in found.reduced
+    write_tokens(file, BERT)
+    credentials.refresh()
+    assert credentials.current(found, time.time()) == bert
 
 
 def test_a_file_whose_reading_fails_in_an_unforeseen_way_leaves_nobody_acting(
