@@ -151,8 +151,6 @@ def _remedy(plan: MqttPlan, trouble: str) -> str:
         return "compare port and authorities with the broker's (`mqtt: tls: {ca: ...}`, openssl s_client -connect)"
     if "not authorized" in lower or "user name" in lower or "refuses" in lower:
         return "compare `username` and the first line of `password_file` with the broker's"
-    if "not installed" in lower:
-        return "install the extra `mqtt`"
     return f"look whether the broker listens at {address(plan.host, plan.port)}, and at the firewall between"
 
 
