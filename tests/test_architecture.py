@@ -429,6 +429,7 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli.rtde.robot_source": "tests/cli/rtde/test_record.py, with a simulator",
     "cli.rtde.robots": "tests/cli/rtde/test_get.py and test_set.py",
     "cli.rtde.sources": "a protocol; tests/cli/rtde/test_record.py",
+    "canopen.manager.boot_steps": "a table; tests/canopen/manager/test_boot.py",
     "canopen.manager.letters": "words; tests/canopen/manager/test_boot.py",
     "canopen.manager.plan": "records; tests/canopen/manager/test_configuration.py",
     "canopen.product": "two numbers; tests/canopen/test_identity.py",

@@ -13,7 +13,7 @@ from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.heartbeat import HeartbeatProducer
-from gatewayd.canopen.manager.boot import BootStep
+from gatewayd.canopen.manager.boot_steps import BootStep
 from gatewayd.canopen.manager.node import ManagedNode, NodeObserver
 from gatewayd.canopen.manager.plan import ManagerPlan, NodePlan
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtCommand, NmtSlave, NmtState

@@ -17,7 +17,8 @@ from gatewayd.canopen.datatypes import CanType, Value
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import spared
 from gatewayd.canopen.heartbeat import WATCH, Seen, Watch
-from gatewayd.canopen.manager.boot import Boot, BootStep
+from gatewayd.canopen.manager.boot import Boot
+from gatewayd.canopen.manager.boot_steps import BootStep
 from gatewayd.canopen.manager.channel import Done, SdoChannel, SdoJob, reason_of
 from gatewayd.canopen.manager.emergency_text import EmergencyMessage, read_emergency
 from gatewayd.canopen.manager.letters import BootError

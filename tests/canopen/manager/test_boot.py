@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from gatewayd.canopen.manager.boot import NEXT, RETRY, Boot, BootSignal, BootStep
+from gatewayd.canopen.manager.boot import RETRY, Boot
+from gatewayd.canopen.manager.boot_steps import NEXT, BootSignal, BootStep
 from gatewayd.canopen.manager.letters import BootError
 from gatewayd.canopen.manager.node import NodeCondition
 from gatewayd.canopen.manager.plan import ExpectedIdentity, ManagedPdo, PdoObject, Setting

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import AbortCode
 from gatewayd.canopen.frame import Frame
-from gatewayd.canopen.manager.boot import BootStep
+from gatewayd.canopen.manager.boot_steps import BootStep
 from gatewayd.canopen.manager.node import ManagedNode, NodeCondition
 from gatewayd.canopen.manager.plan import ManagedPdo, ObjectReading
 from gatewayd.canopen.nmt import NmtCommand
