@@ -136,12 +136,13 @@ class FileWatch:
 
     def changed(self) -> bool:
         """Whether anything changed since the last call; the first time: yes."""
-        found = tuple(map(_signature, self._paths))
+        found = tuple(map(signature_of, self._paths))
         former, self._seen = self._seen, found
         return found != former
 
 
-def _signature(path: Path) -> tuple[int, ...] | None:
+def signature_of(path: Path) -> tuple[int, ...] | None:
+    """What tells a file from a changed one; None: it cannot be looked at. A copy may keep its time, but not `ctime`."""
     try:
         found = path.stat()
     except OSError:

@@ -17,6 +17,7 @@ from typing import NoReturn, TypeVar
 
 from gatewayd.links.modbus_server.credentials import PeerCredentials
 from gatewayd.links.modbus_server.plan import TrustFiles
+from gatewayd.machine.certificates import signature_of
 from gatewayd.machine.revocation import RevocationList, lists_from_pem
 from gatewayd.machine.x509 import Certificate, CertificateError, ders_from_pem, from_pem, parse
 
@@ -186,7 +187,7 @@ def is_exposed(key: str) -> bool:
 
 def stamps_of(files: TrustFiles) -> tuple[object, ...]:
     """Something that is another thing when one of the files is: of a missing one None."""
-    return tuple(map(_stamp, _paths(files).values()))
+    return tuple(signature_of(Path(path)) for path in _paths(files).values())
 
 
 def paths_of(files: TrustFiles) -> Mapping[str, str]:
@@ -241,14 +242,6 @@ def _no_password(key: str) -> NoReturn:
 def _paths(files: TrustFiles) -> dict[str, str]:
     paths = {"certificate": files.certificate, "key": files.key, "clients": files.clients}
     return paths if files.revoked is None else {**paths, "revoked": files.revoked}
-
-
-def _stamp(path: str) -> object:
-    try:
-        found = Path(path).stat()
-    except OSError:
-        return None
-    return found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def _load_lists(context: ssl.SSLContext, path: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import ssl
 from collections.abc import Callable
 from dataclasses import replace
@@ -174,3 +175,21 @@ def test_who_has_to_show_its_certificate_anew(
     before: Trust, after: Trust, issuer: bytes, reason: str
 ) -> None:
     assert ended_by(before, after, PeerCredentials("operator", "plc", 7, issuer, 0.0)) == reason
+
+
+def test_a_file_that_was_overwritten_with_its_old_time_is_another_one(tmp_path: Path) -> None:
+    """`cp -p` onto a file of the same length leaves its inode, and sets its time back."""
+    path = tmp_path / "revoked.pem"
+    path.write_text("one")
+    files, before = TrustFiles(str(path), str(path), str(path), None), path.stat()
+    stamps = stamps_of(files)
+    while path.stat().st_ctime_ns == before.st_ctime_ns:
+        path.write_text("two")
+        os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    after = path.stat()
+    assert (after.st_mtime_ns, after.st_size, after.st_ino) == (
+        before.st_mtime_ns,
+        before.st_size,
+        before.st_ino,
+    )
+    assert stamps_of(files) != stamps
