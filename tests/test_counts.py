@@ -62,6 +62,8 @@ NEVER_ONE = {
     "machine.der: len(found)": "any number but one",
     "mqtt.names: len(topic)": "none, or longer than any topic may be",
     "mqtt.packets: length": "more than is read",
+    "mqtt.engine: len(packet)": "more than a broker takes",
+    "mqtt.wire: len(data)": "more than 65535",
     "mqtt.words: len(data)": "more than is shown",
     "sparkplug.payload: len(data)": "more than the limit",
     "sparkplug.primary_host: len(data)": "more than the limit",

@@ -230,7 +230,7 @@ class Api:
     def refuse_what_waited(self) -> None:
         """Raise ApiError if what arrives now may have waited for long while the gateway stood still.
 
-        Whoever sent it may have given up since, and the plant is no longer as they saw it.
+        Its sender may have given up since, and the plant is no longer as they saw it.
         """
         seconds = self._stood_still()
         if seconds > STALE_ACT:

@@ -1,6 +1,6 @@
 """What the local operator holds and forces, and the picture that forced values make on the process image.
 
-A force is an overlay: the truth is kept beside it. Whoever is about to change the image calls `lift` first, which
+A force is an overlay: the truth is kept beside it. Code that is about to change the image calls `lift` first, which
 puts the truth back, and `lay` afterwards; between the two nobody looks. A forced output is FORCED whatever the robot
 does; a forced input is FORCED while the robot has it, and says what is wrong (stale, unavailable) otherwise.
 """

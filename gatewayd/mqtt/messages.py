@@ -55,7 +55,7 @@ class BrokerSettings:
     host: str
     port: int
     client: str
-    """Client identifier: a broker ends the connection of whoever comes with the same one."""
+    """Client identifier: a broker ends the connection of a client when another comes with the same one."""
     version: int = MQTT_311
     keepalive: int = 10
     """Seconds; without an answer for twice as long the broker is lost."""

@@ -1,4 +1,4 @@
-"""MQTT packets in words, for whoever reads a trace (MQTT 3.1.1 and 5.0, section 3).
+"""MQTT packets in words, for the reader of a trace (MQTT 3.1.1 and 5.0, section 3).
 
 Which version is spoken only CONNECT says; a trace that began later guesses: in version 5 properties stand before a
 payload.

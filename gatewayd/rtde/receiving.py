@@ -83,7 +83,7 @@ class PackageReceiver:
             self._timer.cancel()
 
     def detach(self) -> None:
-        """Have the loop read no more: whoever calls this reads. Until the loop has heard of it both may."""
+        """Have the loop read no more: the caller reads. Until the loop has heard of it both may."""
         if not self.direct and self._transport is not None and self._loop is not None:
             self.direct = self._used = True
             self._loop.call_soon_threadsafe(self._pause)

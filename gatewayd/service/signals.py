@@ -1,7 +1,7 @@
 """What each signal does to `gatewayd run`, from its first line to its last: one table, and the handlers behind it.
 
-Whoever kills a gateway silently leaves the robot with the last command and no fallback. So no signal that a process can
-catch has the system's default effect here, but for faults of the process itself, which say where they happened.
+A gateway that is killed silently leaves the robot with the last command and no fallback. So no signal that a process
+can catch has the system's default effect here, but for faults of the process itself, which say where they happened.
 
 They are blocked in every thread and taken one by one by a thread that waits for nothing else. A handler would run
 between any two instructions of the main thread, and forty signals at a time would be forty handlers on one small stack.

@@ -1,6 +1,6 @@
 """The controller behind the protocol: cycle counter, variables, claims, robot program. No sockets, no clock.
 
-Whoever runs it calls `advance` for every control cycle; everything it shows follows from the number of cycles, from
+Its owner calls `advance` for every control cycle; everything it shows follows from the number of cycles, from
 what was written and from the switches in `faults`.
 """
 

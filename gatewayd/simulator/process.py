@@ -77,7 +77,7 @@ async def _standard_input() -> Callable[[], Awaitable[bytes]]:
 
 
 def _say(line: str, stop: asyncio.Event) -> None:
-    """One line to whoever started us; nobody reading any more means to stop."""
+    """One line to the process that started us; nobody reading any more means to stop."""
     try:
         sys.stdout.write(line + "\n")
         sys.stdout.flush()

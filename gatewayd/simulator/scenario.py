@@ -11,7 +11,7 @@
     5.5   power release
     """
 
-The format is TOML, because the standard library reads it, so that neither the simulator nor whoever tests with it
+The format is TOML, because the standard library reads it, so that neither the simulator nor those who test with it
 needs another package; because it has types, comments and strings of several lines, and editors know it; and because a
 key that is there twice is an error. What happens is written in the commands that standard input takes as well: there is
 one language to learn, and what was tried by hand can be copied into a file.

@@ -2,7 +2,7 @@
 
 The cycle counter follows the clock, at its speed or another. A cycle that comes late is made up for by shortened ones,
 never by a burst; what is more than `MAKE_UP` cycles late is skipped, packages and all. The clock of a stepped
-controller stands still: whoever tests with it says when a cycle passes.
+controller stands still: the test says when a cycle passes.
 """
 
 from __future__ import annotations

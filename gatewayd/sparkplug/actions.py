@@ -1,4 +1,4 @@
-"""What an edge node says to whoever runs it: messages to be sent, commands that came, and what it ignored."""
+"""What an edge node says to its owner: messages to be sent, commands that came, and what it ignored."""
 
 from __future__ import annotations
 

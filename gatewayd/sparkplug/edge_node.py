@@ -6,7 +6,7 @@ message is on its way.
 
 What the specification leaves open:
 - A rebirth that is asked for within `rebirth_pause` after a birth happens when the pause is over, once for all who
-  asked; data goes on until then. Whoever may send NCMD could otherwise keep a gateway busy with births.
+  asked; data goes on until then. A sender of NCMD could otherwise keep a gateway busy with births.
 - An offline primary host makes a node leave that has been born. One that has not waits where it is: with one server,
   leaving would mean to connect again for the same answer. Where there are several, `leaves_waiting` lets it walk.
 - NDEATH is not published before a birth: births are the first messages (tck-id-principles-birth-certificates-order).
@@ -66,7 +66,7 @@ class EdgeNode:
         self.settings = settings
         self.state = OFFLINE
         self.next_bd_seq = next_bd_seq % SEQUENCES
-        """Of the next CONNECT. Whoever runs the node keeps it across restarts."""
+        """Of the next CONNECT. The owner of the node keeps it across restarts."""
         self.births = 0
         """Birth sequences so far, the first of each session included."""
         self.history = ValueHistory(settings.history)

@@ -33,7 +33,7 @@ from gatewayd.sparkplug.wire import (
 
 @dataclass(frozen=True, slots=True)
 class PayloadLimits:
-    """What is read at most: whoever publishes must not decide how long a reader works."""
+    """What is read at most: a publisher must not decide how long a reader works."""
 
     size: int = 64 * 1024
     """Bytes of a payload."""

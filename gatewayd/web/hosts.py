@@ -33,7 +33,7 @@ def name_of(host: str) -> str | None:
 def is_ours(host: str, names: Collection[str], own_addresses: Collection[str]) -> bool:
     """Whether a Host header calls this listener: `names` are declared, `own_addresses` those of the connection.
 
-    Whoever comes through a tunnel calls it localhost, or by a loopback address.
+    A client that comes through a tunnel calls it localhost, or by a loopback address.
     """
     name = name_of(host)
     if name is None:

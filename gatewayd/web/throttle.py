@@ -1,8 +1,8 @@
 """Wrong tokens are answered later and later, by the peer that gives them. Pure: time is a parameter.
 
-Only the answer to a wrong one waits. A right one is never delayed, whoever guesses behind the same address (NAT): to
-lock a peer out would be a weapon against who belongs there, and against guessing it is not needed, because nobody
-guesses 256 bits. What the delay is for: guesses stay few, cheap and visible.
+Only the answer to a wrong one waits. A right one is never delayed, even if somebody else guesses behind the same
+address (NAT): to lock a peer out would be a weapon against who belongs there, and against guessing it is not needed,
+because nobody guesses 256 bits. What the delay is for: guesses stay few, cheap and visible.
 """
 
 from __future__ import annotations

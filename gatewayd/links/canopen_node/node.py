@@ -414,7 +414,7 @@ class Node:
         return self._rpdo_writers.get(number, self.plan.rpdo_writer)
 
     def _lose_node(self, reason: str, node: int, now: float) -> None:
-        """Its writers are lost; by the mapping's promise that is no communication error, whoever else is."""
+        """Its writers are lost; by the mapping's promise that is no communication error, as others are."""
         reason = "guarding requests have stopped" if node == GUARDING else reason.format(node)
         for writer in self.promises.of(node):
             self._lose(writer, reason, now)

@@ -57,7 +57,7 @@ def beside(plan: ModbusPlan) -> str:
 
 
 def _secured(tls: SecuredPlan, cell: CellDefinition) -> dict[str, str]:
-    """Each role is a setting: whoever is given a right, or loses one, is seen by name."""
+    """Each role is a setting: a role that is given a right, or loses one, is seen by name."""
     files = tls.files
     return {
         "tls listen": address(tls.host, tls.port),

@@ -1,7 +1,7 @@
 """Commands of a broker to a cell: each writer's request, judged by the core as any other.
 
-A message names nobody who sent it, so a writer is whoever may publish to its topic; the broker's access list says who
-that is.
+A message names nobody who sent it, so a writer is any client that may publish to its topic; the broker's access list
+says who that is.
 """
 
 from __future__ import annotations

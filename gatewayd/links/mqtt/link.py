@@ -118,7 +118,7 @@ class MqttLink(Link):
             figures,
         )
 
-    # -- for whoever says its values ---------------------------------------------------------------------------------
+    # -- for the part that publishes its values ----------------------------------------------------------------------
 
     def state(self) -> int:
         """Of the connection, as the status block has it."""

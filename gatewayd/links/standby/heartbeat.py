@@ -1,6 +1,6 @@
 """What two gateways tell each other, ten times a second in one datagram: who they are and how they are. Pure.
 
-A datagram is believed only if it repeats the number that its reader drew when it started: whoever sent it receives
+A datagram is believed only if it repeats the number that its reader drew when it started: its sender receives
 what is sent to the other gateway. What does not fit in every byte is dropped and counted. Nothing in it makes a
 gateway write, and none of it decides who serves the cell: that does the robot, by its claims.
 

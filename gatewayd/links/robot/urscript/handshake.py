@@ -1,6 +1,6 @@
 """The robot's half of a handshake by two bits: data first, then a toggle, then the acknowledgement.
 
-Whoever sends writes its data, then changes the toggle bit. Whoever receives sees that toggle and acknowledgement
+The sender writes its data, then changes the toggle bit. The receiver sees that toggle and acknowledgement
 differ, takes the data, and makes the acknowledgement equal to the toggle. Then the sender may send again. Both bits are
 in registers, so nothing is lost when a program restarts, and a change that nobody has seen stays visible.
 """
