@@ -106,12 +106,13 @@ class JsonLink(MqttLink):
         client = self.session.client if self.session is not None else None
         ahead = self._wall() - now
         is_there = client is not None and client.is_connected
-        for sample in self.publisher.due(now, repeat=is_there):
+        for sample in self.publisher.due(now, repeat=is_there, owed=client is not None and client.writable):
             found = value_fields(sample, ahead, self._unit(sample.variable))
             message = Message(self.plan.topic_of(sample.name), encode(found), 0, self.plan.retain)
-            if not self._publish(message) and not sample.is_first:
+            taken = self._publish(message)
+            if not taken and not sample.is_first:
                 self.store.add(sample, now)
-            self.publisher.said(sample, now)
+            self.publisher.said(sample, now, taken=taken)
         self.store.expire(now)
         for _ in range(MAX_HISTORY):
             kept = self.store.first()

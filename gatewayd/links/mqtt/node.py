@@ -15,7 +15,7 @@ from pathlib import Path
 from gatewayd.links.contract import Link
 from gatewayd.links.mqtt.bd_seq import bd_seq_file, read_bd_seq, write_bd_seq
 from gatewayd.links.mqtt.commands import MAX_BURST, MAX_RATE
-from gatewayd.links.mqtt.plan import MqttPlan
+from gatewayd.links.mqtt.plan import MqttPlan, SparkplugPlan
 from gatewayd.links.mqtt.session import BrokerSession
 from gatewayd.links.mqtt.sparkplug_link import SparkplugLink
 from gatewayd.logs.records import fields
@@ -48,12 +48,8 @@ class SparkplugNode:
         self._now = self._waited = 0.0
         """Of the message that is served now."""
         self._allowance = Allowance(MAX_BURST, MAX_RATE)
-        kept = [plan for plan in plans if plan.keep is not None]
-        limits = HistoryLimits(
-            size=sum(each.size for each in kept), age=max((each.keep or 0.0 for each in kept), default=0.0)
-        )
         self.node = EdgeNode(
-            EdgeNodeSettings(sparkplug.group, sparkplug.node, sparkplug.primary_host, history=limits),
+            EdgeNodeSettings(sparkplug.group, sparkplug.node, sparkplug.primary_host, history=_limits(plans)),
             self,
             self._utc,
             devices=[link.declaration() for link in self._links.values()],
@@ -65,14 +61,17 @@ class SparkplugNode:
         self.session = session
 
     def goes_on(self, links: Sequence[Link]) -> bool:
-        """While there is a device."""
-        return bool(links)
+        """While there is a device, and the edge node is the same one."""
+        found = {(each.group, each.node, each.primary_host) for link in links if (each := _sparkplug(link))}
+        mine = self.node.settings
+        return found == {(mine.group, mine.node, mine.primary_host)}
 
     def serve(self, links: Sequence[Link], now: float) -> None:
         """Devices are these from now on."""
         self._links = _by_device(links)
         for link in self._links.values():
             link.session = self.session
+        self.node.history.limits = _limits([link.plan for link in self._links.values()])
         self.node.redeclare((), [link.declaration() for link in self._links.values()], now)
         self._say(now)
 
@@ -217,3 +216,13 @@ class SparkplugNode:
 
 def _by_device(links: Sequence[Link]) -> dict[str, SparkplugLink]:
     return {link.device: link for link in links if isinstance(link, SparkplugLink)}
+
+
+def _sparkplug(link: Link) -> SparkplugPlan | None:
+    return link.plan.sparkplug if isinstance(link.plan, MqttPlan) else None
+
+
+def _limits(plans: Sequence[MqttPlan]) -> HistoryLimits:
+    """What the cells of an edge node want to be kept, together."""
+    kept = [(plan.keep, plan.size) for plan in plans if plan.keep is not None]
+    return HistoryLimits(size=sum(size for _, size in kept), age=max((keep for keep, _ in kept), default=0.0))

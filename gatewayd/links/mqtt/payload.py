@@ -74,6 +74,9 @@ def decode_command(payload: bytes) -> CellCommand:
     name = found.get("id")
     if not isinstance(name, str | int | None) or isinstance(name, bool) or len(str(name)) > MAX_ID:
         raise CommandError(f"`id` is no text or number of at most {MAX_ID} characters")
+    if isinstance(name, str) and not name.isascii() and any(0xD800 <= ord(each) <= 0xDFFF for each in name):
+        # JSON's escapes can say half a character, which no answer could repeat.
+        raise CommandError("`id` has half a surrogate pair")
     if len(found.keys() - {"id"}) > 1:
         raise CommandError("one command has one of write, request and release")
     return CellCommand(
@@ -96,7 +99,12 @@ def _written(found: Mapping[str, object]) -> Mapping[str, object] | None:
 
 def _object(payload: bytes) -> dict[str, object]:
     try:
-        found = json.loads(payload.decode("utf-8"), object_pairs_hook=_once, parse_constant=_no_constant)
+        found = json.loads(
+            payload.decode("utf-8"),
+            object_pairs_hook=_once,
+            parse_constant=_no_constant,
+            parse_float=_finite,
+        )
     except CommandError:
         raise
     except (ValueError, RecursionError) as error:
@@ -110,6 +118,14 @@ def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
     found = dict(pairs)
     if len(found) < len(pairs):
         raise CommandError("a key stands there twice")
+    return found
+
+
+def _finite(text: str) -> float:
+    """A real; one that has no room for it would be infinite, which nobody has said."""
+    found = float(text)
+    if not math.isfinite(found):
+        raise CommandError(f"{text[:40]} has no room in a real")
     return found
 
 

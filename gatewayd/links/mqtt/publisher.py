@@ -1,8 +1,8 @@
 """Which values are due to be published: on change, by deadband and interval. Pure: time is a parameter.
 
 A change is due `interval` after the last message of its variable at the earliest, and then it is the value of that
-moment: what came and went in between is not seen. Nothing waits in a queue, so a slow broker gets
-fewer values, never older ones.
+moment: what came and went in between is not seen. That a value is good no longer is due at once. Nothing waits in a
+queue, so a slow broker gets fewer values, never older ones; what it did not take is due again when it takes something.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class ValueSample:
     time: float
     """When its source had it, monotonic; minus infinity: never."""
     is_first: bool = False
-    """Nothing was said of it yet, so it is no change."""
+    """It is no change: nothing was said of it yet, or just this."""
 
 
 @dataclass(slots=True)
@@ -47,6 +47,8 @@ class _Said:
     value: Value | None = None
     quality: Quality | None = None
     """None: nothing was said yet."""
+    is_owed: bool = False
+    """Whether the broker did not take it."""
 
 
 class Publisher:
@@ -66,7 +68,7 @@ class Publisher:
     def forget(self) -> None:
         """Nobody knows any more what was said: all of it is due."""
         for said in self._said:
-            said.at, said.quality = -math.inf, None
+            said.at, said.quality, said.is_owed = -math.inf, None, False
 
     def succeed(self, former: Publisher) -> None:
         """Go on with what the former one has said under the same names."""
@@ -75,22 +77,30 @@ class Publisher:
             same = known.get(said.publication.name)
             if same is not None:
                 said.at, said.value, said.quality = same.at, same.value, same.quality
+                said.is_owed = same.is_owed
 
-    def due(self, now: float, *, repeat: bool) -> Iterator[ValueSample]:
-        """What is to be said now; `said` has to be called for what was. `repeat`: also what is said every so often."""
+    def due(self, now: float, *, repeat: bool, owed: bool = False) -> Iterator[ValueSample]:
+        """What is to be said now; `said` has to be called for what was.
+
+        `repeat`: also what is said every so often. `owed`: also what the broker did not take when it was due.
+        """
         image = self._image
         values, qualities, unreadable = image.values, image.quality, image.unreadable
         for said in self._said:
             publication = said.publication
             since = now - said.at
-            if since < publication.interval - _EARLY:
-                continue
             index = publication.variable
             quality = qualities[index]
+            is_good_no_longer = said.quality is Quality.GOOD and quality is not Quality.GOOD
+            if since < publication.interval - _EARLY and not is_good_no_longer:
+                continue
             value = None if index in unreadable else values[index]
-            if (repeat and since >= self._every) or self._differs(said, value, quality):
-                time = image.time_of(index)
-                yield ValueSample(publication.name, index, value, quality, time, said.quality is None)
+            differs = self._differs(said, value, quality)
+            if differs or (owed and said.is_owed) or (repeat and since >= self._every):
+                is_change = differs and said.quality is not None
+                yield ValueSample(
+                    publication.name, index, value, quality, image.time_of(index), not is_change
+                )
 
     def sample(self, variable: int) -> ValueSample:
         """What a variable is now, whether or not it is due."""
@@ -98,9 +108,10 @@ class Publisher:
         value = None if variable in image.unreadable else image.values[variable]
         return ValueSample("", variable, value, image.quality[variable], image.time_of(variable))
 
-    def said(self, sample: ValueSample, now: float) -> None:
-        """A sample was sent, or kept."""
+    def said(self, sample: ValueSample, now: float, *, taken: bool = True) -> None:
+        """A sample was sent; or, where it was not taken, is kept or let go."""
         said = self._by_variable[sample.variable]
+        said.is_owed = not taken
         said.at, said.value, said.quality = now, sample.value, sample.quality
 
     @staticmethod

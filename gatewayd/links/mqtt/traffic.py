@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from gatewayd.links.contract import Medium, TrafficDecoder
 from gatewayd.mqtt.messages import DEFAULT_PORT
-from gatewayd.mqtt.packets import MqttProtocolError, Oversized, PacketSplitter
+from gatewayd.mqtt.packets import Oversized, PacketSplitter
+from gatewayd.mqtt.wire import MqttProtocolError
 from gatewayd.mqtt.words import PacketWords
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable

@@ -263,3 +263,83 @@ def test_what_only_the_quality_says_is_a_change() -> None:
     rig.client.sent.clear()
     rig.link.tick(rig.now)
     assert rig.said("count")["quality"] == "unavailable"
+
+
+def test_that_a_value_is_good_no_longer_is_said_at_once_whatever_its_interval() -> None:
+    rig = Rig(BROKER.replace("interval: 100ms", "interval: 60s").replace("every: 10s", "every: none"))
+    rig.connect()
+    rig.client.sent.clear()
+    rig.now += 6
+    rig.cell.tick(rig.now)
+    rig.link.tick(rig.now)
+    assert rig.said("count")["quality"] == "stale"
+    assert rig.after(1) == [], "it is good again, which has time"
+    assert set(rig.after(60)) >= {"count"}
+
+
+def test_what_a_slow_broker_did_not_take_is_said_when_it_takes_something() -> None:
+    """It was kept, as a change; but its topic still said what it had been before."""
+    rig = Rig(BROKER.replace("every: 10s", "every: none"))
+    rig.connect()
+    rig.client.writable = False
+    assert rig.after(0.2, count=1) == []
+    rig.client.writable = True
+    assert rig.after(0.2) == ["count", "history/count"]
+    assert rig.said("count")["value"] == 1
+    assert rig.after(0.2) == []
+
+
+def test_a_broker_that_is_slow_from_the_first_moment_gets_all_of_it_later() -> None:
+    rig = Rig(BROKER.replace("every: 10s", "every: none"))
+    rig.client.writable = False
+    rig.link.connected(rig.now)
+    assert rig.after(0.2) == []
+    rig.client.writable = True
+    assert set(rig.after(0.2)) >= {"speed", "flag", "count", "force"}
+    assert rig.link.health().figures["dropped"] == 0
+
+
+def test_an_id_that_no_answer_can_repeat_is_refused_and_nothing_is_written() -> None:
+    rig = Rig()
+    rig.connect()
+    found = rig.command(b'{"id": "\\ud800", "write": {"speed": 0.5}}')
+    assert (found["result"], found["reason"]) == ("refused", "malformed")
+    assert rig.cell.image.values[SPEED] == 0.0
+    assert rig.command(b'{"write": {"\\ud800": 0.5}}')["reason"] == "no_such_address"
+    assert rig.command({"id": "\U0001f600", "write": {"speed": 0.5}})["id"] == "\U0001f600"
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b'{"write":{"speed":1e999}}',
+        b'{"write":{"speed":-1e999}}',
+        b'{"write":{"speed":NaN}}',
+        b'{"write":{"speed":0,"speed":1}}',
+        b'{"write":{"speed":%s}}' % (b"9" * 4000),
+        b'{"write":{"speed":%s}}' % (b"9" * 5000),
+        b"[" * 60_000,
+        b'{"write":' * 5000,
+        '{"write":{"speed":1}}'.encode("utf-16"),
+        b"\0",
+        b'{"write":{"speed":"\\u0000"}}',
+        b'{"write":{"speed":{}}}',
+        b'{"write":{"speed":null}}',
+        b'{"\\ud800":1}',
+        b'{"request":["\\ud800"]}',
+        b'{"id":[],"write":{"speed":1}}',
+        b"\xff",
+    ],
+)
+def test_hostile_payloads_are_refused_with_words(payload: bytes) -> None:
+    rig = Rig()
+    rig.connect()
+    assert rig.command(payload)["result"] == "refused"
+    assert rig.cell.image.values[SPEED] == 0.0
+
+
+def test_infinity_reaches_no_robot() -> None:
+    rig = Rig(variables=VARIABLES.replace(", limits: [0, 1]", ""))
+    rig.connect()
+    for text in (b"1e999", b"-1e999"):
+        assert rig.command(b'{"write":{"speed":%s}}' % text)["reason"] == "malformed"

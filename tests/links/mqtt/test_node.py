@@ -206,3 +206,22 @@ async def test_a_device_that_comes_by_a_reload_is_born(tmp_path: Path) -> None:
     assert [name for name, _ in rig.taken()] == ["DBIRTH", "DDATA"]
     rig.speaker.serve([lathe], rig.now)
     assert [name for name, _ in rig.taken()] == ["DBIRTH", "DDATA", "DDEATH"]
+
+
+def test_another_node_or_host_by_the_same_client_is_another_edge_node(tmp_path: Path) -> None:
+    """The client identifier may be the mapping's own, and stay."""
+    rig = NodeRig(tmp_path)
+    assert rig.speaker.goes_on([rig.device])
+    for old, new in (("node: hall-2", "node: hall-3"), ("node: hall-2", "node: hall-2, primary_host: scada")):
+        other = NodeRig(tmp_path, BROKER.replace(old, new))
+        assert not rig.speaker.goes_on([other.device])
+    assert not rig.speaker.goes_on([])
+    assert not rig.speaker.goes_on([Rig().link]), "a cell with JSON"
+
+
+async def test_a_reload_changes_how_much_is_kept(tmp_path: Path) -> None:
+    rig = NodeRig(tmp_path)
+    other = NodeRig(tmp_path, BROKER.replace("interval", "store: {keep: none}, interval"))
+    assert rig.speaker.node.history.limits.size == 10_000
+    rig.speaker.serve([other.device], rig.now)
+    assert rig.speaker.node.history.limits.size == 0
