@@ -16,6 +16,7 @@ from gatewayd.mqtt.waiting import WaitedMessages
 from gatewayd.mqtt.wire import MqttProtocolError
 
 _TYPE_AND_QOS, _PUBLISH = 0xF6, 0x30
+CLOSED = "the broker has closed the connection"
 MAX_UNSENT = 65_536
 """Bytes that wait in us for a slow broker; beyond them nothing is given any more."""
 MAX_TURN = 16
@@ -109,12 +110,12 @@ class BrokerConnection(asyncio.Protocol):
 
     def eof_received(self) -> None:
         """The broker has closed."""
-        self.end("the broker has closed the connection")
+        self.end(self._closed())
 
     def connection_lost(self, error: Exception | None) -> None:
         """See asyncio."""
         why = getattr(error, "strerror", None) or (str(error) if error else "")
-        self.end(why or "the broker has closed the connection")
+        self.end(why or self._closed())
 
     # -- called by the client ----------------------------------------------------------------------------------------
 
@@ -182,6 +183,12 @@ class BrokerConnection(asyncio.Protocol):
             self._transport.abort()
 
     # -- inside ------------------------------------------------------------------------------------------------------
+
+    def _closed(self) -> str:
+        """Why a broker may have done so: 3.1.1 has no word for it, and not every broker of 5.0 says the one it has."""
+        if not self.accepted.done():
+            return CLOSED
+        return f"{CLOSED}: it ended, or another client has come with the same client identifier"
 
     def _serve(self) -> None:
         for _ in range(min(MAX_TURN, len(self._queue))):

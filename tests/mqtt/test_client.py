@@ -282,3 +282,14 @@ async def test_what_passes_can_be_traced(tmp_path: Path) -> None:
         await until(lambda: client.is_connected, "a connection")
         assert [(data[0] >> 4, outgoing) for data, outgoing in passed] == [(1, True), (2, False)]
         task.cancel()
+
+
+@VERSIONS
+async def test_another_client_with_the_same_identifier_is_named(tmp_path: Path, version: int) -> None:
+    with mosquitto(tmp_path / "broker") as broker:
+        async with at_work(settings_of(broker, version)) as (client, user):
+            await until(lambda: client.is_connected, "a connection")
+            async with at_work(settings_of(broker, version)) as (thief, _other):
+                await until(lambda: thief.connections > 0, "the other one")
+                await until(lambda: bool(user.losses), "the loss")
+            assert "another client has come with the same" in user.losses[0]
