@@ -72,6 +72,8 @@ class Gateways:
     def active(self) -> int:
         """Which of them serves the cell, once one does and the other could take over."""
         wait_for(lambda: any(self.standby(number).get("peer_ready") for number in (0, 1)), "a pair", START)
+        # Two gateways may be a pair before both of them listen for control.
+        wait_for(lambda: all(self.role(number) for number in (0, 1)), "both control sockets", START)
         (found,) = (number for number in (0, 1) if self.role(number) == "active")
         return found
 
@@ -111,6 +113,7 @@ def test_a_crash_is_survived_and_the_robot_keeps_its_values(plant: Plant) -> Non
     assert plc.write(10, [0, 7]) == 0
     assert plc.write(12, [0, 8]) == 0
     wait_for(lambda: gateways.robot.integer("input_int_register_0") == 7, "the value in the robot")
+    wait_for(lambda: gateways.robot.integer("input_int_register_1") == 8, "the other value in the robot")
     crashed = time.monotonic()
     gateways.daemons[active].kill()
     plc = gateways.plc()
