@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -18,7 +19,7 @@ from gatewayd.mqtt.wire import MqttProtocolError
 _TYPE_AND_QOS, _PUBLISH = 0xF6, 0x30
 CLOSED = "the broker has closed the connection"
 MAX_UNSENT = 65_536
-"""Bytes that wait in us for a slow broker; beyond them nothing is given any more."""
+"""Bytes that wait in us for a slow broker; beyond them nothing is given any more. As many wait in the kernel."""
 MAX_TURN = 16
 """Messages that are served before others have their turn: some 2 ms, if each of them is a command."""
 
@@ -69,6 +70,8 @@ class BrokerConnection(asyncio.Protocol):
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         transport.set_write_buffer_limits(high=MAX_UNSENT)
+        # Left to itself the kernel takes megabytes for a slow broker, which gets values that are minutes old then.
+        transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MAX_UNSENT // 2)
         self._engine.begin()
 
     def data_received(self, data: bytes) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import subprocess
 import threading
 from collections.abc import AsyncIterator, Callable, Sequence
@@ -293,3 +294,30 @@ async def test_another_client_with_the_same_identifier_is_named(tmp_path: Path, 
                 await until(lambda: thief.connections > 0, "the other one")
                 await until(lambda: bool(user.losses), "the loss")
             assert "another client has come with the same" in user.losses[0]
+
+
+async def test_neither_we_nor_the_kernel_keep_much_for_a_broker_that_reads_nothing() -> None:
+    """It would get all of it later, and believe that it is new."""
+    listener = socket.create_server((HOST, 0))
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+
+    async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read(100)
+        writer.transport.pause_reading()  # type: ignore[attr-defined]
+        writer.write(b"\x20\x02\x00\x00")
+        await until(lambda: bool(full), "the end of the test")
+        writer.transport.abort()
+
+    full: list[int] = []
+    async with (
+        await asyncio.start_server(accept, sock=listener, limit=100),
+        at_work(BrokerSettings(HOST, listener.getsockname()[1], "press")) as (client, _user),
+    ):
+        await until(lambda: client.is_connected, "a connection")
+        taken = 0
+        for _ in range(300):
+            while client.publish(Message("a", bytes(1000))):
+                taken += 1000
+            await asyncio.sleep(0.001)
+        full.append(taken)
+    assert taken < 300_000
