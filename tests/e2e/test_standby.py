@@ -200,6 +200,10 @@ def test_another_mapping_stands_by_until_it_is_the_same(plant: Plant) -> None:
     assert "the mapping of the other gateway differs" in refused.stderr
     status = gateways.command("status", "--socket", gateways.sockets[active])
     assert "the other gateway has another mapping" in status.stdout
+    gateways.daemons[active].kill()
+    gateways.daemons[active] = gateways.start(active)
+    wait_for(lambda: gateways.role(active) == "active", "the one that served the cell before", START)
+    assert gateways.role(1 - active) == "mismatched"
     other.write_text(text)
     assert gateways.command("reload", "--socket", gateways.sockets[1 - active]).returncode == 0
     assert gateways.active() == active

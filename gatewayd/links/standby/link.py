@@ -18,6 +18,7 @@ from gatewayd.links.standby.files import StandbyFiles, directory_of
 from gatewayd.links.standby.heartbeat import Heartbeat, decode, encode
 from gatewayd.links.standby.plan import Endpoint, StandbyPlan
 from gatewayd.links.standby.roles import StandbyRole
+from gatewayd.links.standby.served_mark import ServedMark
 from gatewayd.links.standby.sight import PERIOD, Sight
 from gatewayd.links.standby.station import RoleChange, StandbyStation
 from gatewayd.logs.records import fields
@@ -50,7 +51,10 @@ class StandbyLink(DutyLink):
         self._state = state
         number = secrets.randbits(63) + 1
         self._sight = Sight(number, cell.definition.fingerprint)
-        self._station = StandbyStation(self._sight, random.random, has_address=bool(plan.address))
+        self._mark = ServedMark(state, cell.definition.name)
+        self._station = StandbyStation(
+            self._sight, random.random, has_address=bool(plan.address), served_last=self._mark.read()
+        )
         self._files = self._new_files()
         self._transport: asyncio.DatagramTransport | None = None
         self._progress = 0
@@ -75,6 +79,7 @@ class StandbyLink(DutyLink):
             self._turned(change)
         if self._files is not None:
             self._files.update(now, eligible=self._station.role.has_claim)
+        self._mark.write(served_last=self._station.served_last)
         self._report_words(now)
         return self._station.duty(now)
 

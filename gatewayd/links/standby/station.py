@@ -51,7 +51,9 @@ class RoleChange:
 class StandbyStation:
     """The state machine of one cell's gateway. `jitter` gives numbers from 0 to 1."""
 
-    def __init__(self, sight: Sight, jitter: Callable[[], float], *, has_address: bool) -> None:
+    def __init__(
+        self, sight: Sight, jitter: Callable[[], float], *, has_address: bool, served_last: bool = False
+    ) -> None:
         self.role = StandbyRole.STANDING_BY
         self.since = -math.inf
         """When the role began."""
@@ -59,6 +61,9 @@ class StandbyStation:
         """Times that the cell came to be served here."""
         self.why = ""
         """Why the role is as it is; empty: it has always been."""
+        self.served_last = served_last
+        """Whether no other gateway was seen to serve the cell since this one did. To be kept across restarts: it may go
+        on beside another mapping, which the other gateway may not."""
         self.sight = sight
         self.has_address = has_address
         self.claim = Claim.NO_SESSION
@@ -118,6 +123,7 @@ class StandbyStation:
             self._next_try = now + GONE_AFTER
         self._note(claim, now)
         held = address if self.has_address else True
+        self.served_last = self.sight.role(now) not in _ACTIVE and self.served_last
         signal = self._signal(claim, held, now)
         if signal is None or (self.role, signal) not in MOVES:
             return None
@@ -154,7 +160,7 @@ class StandbyStation:
         return look(claim, address, now)
 
     def _standing_by(self, claim: Claim, _address: bool | None, _now: float) -> RoleSignal | None:
-        if self.sight.differs:
+        if self.sight.differs and not self.served_last:
             return RoleSignal.DIFFERS
         return RoleSignal.CLAIMED if claim is Claim.HELD else None
 
@@ -197,6 +203,7 @@ class StandbyStation:
             self.role = StandbyRole.ACTIVE
         self.since, self.why, self._leave = now, signal.value, False
         self.takeovers += self.role is StandbyRole.ACTIVE and former is not StandbyRole.RECOVERING
+        self.served_last = self.served_last or self.role is StandbyRole.ACTIVE
         if signal in {RoleSignal.NO_ADDRESS, RoleSignal.ADDRESS_HELD}:
             self.unaddressed = signal is RoleSignal.NO_ADDRESS
         if self.role is StandbyRole.STANDING_BY:

@@ -38,13 +38,16 @@ class Rig:
     claim: Claim = Claim.UNASKED
     address: bool | None = False
     has_address: bool = True
+    served_last: bool = False
     now: float = 1000.0
     asked: list[float] = field(default_factory=list)
     withdrawn: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.sight = Sight(11, 7)
-        self.station = StandbyStation(self.sight, lambda: 0.5, has_address=self.has_address)
+        self.station = StandbyStation(
+            self.sight, lambda: 0.5, has_address=self.has_address, served_last=self.served_last
+        )
         self.duty = Duty(serve=False)
 
     @property
@@ -225,6 +228,24 @@ def test_the_one_that_serves_goes_on_beside_another_mapping() -> None:
     rig.other = replace(READY, fingerprint=8)
     rig.run(5)
     assert rig.role is StandbyRole.ACTIVE
+
+
+def test_the_one_that_served_last_claims_again_beside_another_mapping() -> None:
+    mismatched = replace(OTHER, role=StandbyRole.MISMATCHED, fingerprint=8)
+    rig = Rig(other=mismatched, served_last=True)
+    rig.run(1)
+    assert (rig.role, bool(rig.asked)) == (StandbyRole.STANDING_BY, True)
+    rig = Rig(other=mismatched)
+    rig.run(1)
+    assert (rig.role, rig.asked) == (StandbyRole.MISMATCHED, [])
+
+
+def test_who_sees_the_other_serve_the_cell_did_not_serve_it_last() -> None:
+    rig = Rig(other=replace(OTHER, fingerprint=8), served_last=True)
+    rig.run(1)
+    assert (rig.role, rig.station.served_last) == (StandbyRole.MISMATCHED, False)
+    served = Rig().active()
+    assert served.station.served_last
 
 
 def test_planned_switch() -> None:
