@@ -1,6 +1,7 @@
 """The tokens that count now, and the end of what those held that count no more. Pure but for reading the file.
 
-The file is the truth. One that is gone revokes every token. One that cannot be read (a slip of an editor) revokes
+The file is the truth. One that is gone revokes every token, once it was missed twice: editors that save by renaming
+leave it absent for a moment. One that cannot be read (a slip of an editor) revokes
 none, because a release moves actuators: the tokens that were read before still read, and what they hold stays theirs
 until its time, but nothing can be changed by any, so that one that was to be revoked does no more; and it is reported.
 """
@@ -54,18 +55,21 @@ class Credentials:
         """Why the file is not what counts; empty: it is."""
         self._cells = cells
         self._watch = FileWatch((path,))
+        self._was_missed = False
 
     def refresh(self) -> bool:
         """Read the file if it changed; whether it did. It may wait for a file system: call it in a thread."""
-        if not self._watch.changed():
+        was_missed, self._was_missed = self._was_missed, False
+        if not self._watch.changed() and not was_missed:
             return False
         try:
             self.tokens, self.fault = read_tokens(self.path), ""
         except FileNotFoundError:
-            self.tokens, self.fault = (
-                TokenSet(),
-                f"{self.path}: No such file or directory; gatewayd token create",
-            )
+            self.fault = f"{self.path}: No such file or directory; gatewayd token create"
+            if was_missed:
+                self.tokens = TokenSet()
+            else:
+                self._was_missed = True
         except TokenFileError as error:
             self.fault = str(error)
         except Exception as error:

@@ -62,6 +62,16 @@ WALL_CLOCK = {
     "control/server": "the time in answers",
     "demo/snapshot": "the time on the screen",
     "audit/trail": "the time of a record",
+    "cli/token": "when tokens end",
+    "links/modbus_server/doctor": "when certificates end",
+    "links/modbus_server/renewal": "when certificates end",
+    "links/modbus_server/rules/certificates": "when certificates end",
+    "links/modbus_server/secure_connection": "when certificates end",
+    "links/mqtt/json_link": "the time of a value in a message",
+    "links/mqtt/node": "the time of a value in a message",
+    "service/assemble": "when tokens and certificates end",
+    "web/guard": "when tokens end",
+    "web/launch": "when tokens and certificates end",
     "web/view": "the time on the page",
 }
 """The only modules that may ask the wall clock, and what for."""

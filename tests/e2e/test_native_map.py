@@ -33,7 +33,7 @@ def connect(plant: Plant) -> tuple[Simulator, ModbusClient]:
     simulator = plant.simulator()
     text = MAPPING.read_text()
     for place, value in (
-        (r"host: 192\.168\.1\.15", f"host: {HOST}\n  port: {simulator.port}\n  stale_after: 600ms"),
+        (r"host: 192\.0\.2\.15", f"host: {HOST}\n  port: {simulator.port}\n  stale_after: 600ms"),
         (r"listen: 127\.0\.0\.1:\d+", f"listen: {HOST}:{plant.modbus}"),
         (r"modbus: 127\.0\.0\.1,", "modbus: 127.0.0.0/8,"),
     ):

@@ -50,7 +50,7 @@ def image(plant: Plant) -> Daemon:
     """The shipped full image, unchanged but for the addresses."""
     text = IMAGE.read_text()
     for place, value in (
-        (r"host: 192\.168\.1\.10", f"host: {HOST}\n  stale_after: 600ms"),
+        (r"host: 192\.0\.2\.10", f"host: {HOST}\n  stale_after: 600ms"),
         (r"listen: 127\.0\.0\.1:\d+", f"listen: {HOST}:{plant.modbus}"),
         (r"modbus: 127\.0\.0\.1,", f"modbus: {PLC},"),
     ):

@@ -74,6 +74,8 @@ class Gateways:
         wait_for(lambda: any(self.standby(number).get("peer_ready") for number in (0, 1)), "a pair", START)
         # Two gateways may be a pair before both of them listen for control.
         wait_for(lambda: all(self.role(number) for number in (0, 1)), "both control sockets", START)
+        # The other one may have heard of the claim before this one has looked for its address.
+        wait_for(lambda: "active" in (self.role(0), self.role(1)), "one that serves the cell", START)
         (found,) = (number for number in (0, 1) if self.role(number) == "active")
         return found
 

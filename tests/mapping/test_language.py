@@ -17,12 +17,12 @@ def test_keys_come_in_the_order_of_the_kinds() -> None:
         "variables", "tests",
     ]  # fmt: skip
     assert list(VARIABLE.model_fields) == [
-        "robot", "dashboard", "modbus", "canopen", "device", "owner", "takeover", "lease", "group", "limits", "clamp",
-        "on_release", "on_stale", "valid", "deadband", "unit", "comment",
+        "robot", "dashboard", "modbus", "canopen", "device", "mqtt", "owner", "takeover", "lease", "group", "limits",
+        "clamp", "on_release", "on_stale", "valid", "deadband", "unit", "comment",
     ]  # fmt: skip
     assert list(WRITER.model_fields) == [
-        "modbus", "role", "canopen", "pdos", "node", "heartbeat", "guarding", "device", "timeout", "timeout_counts",
-        "grace",
+        "modbus", "role", "canopen", "pdos", "node", "heartbeat", "guarding", "device", "mqtt", "timeout",
+        "timeout_counts", "grace",
     ]  # fmt: skip
 
 
@@ -38,6 +38,6 @@ def test_a_writer_needs_some_link() -> None:
     (mistake,) = caught.value.mistakes
     assert mistake.kind == "missing-key"
     assert mistake.context == {
-        "message": "a writer needs the key `modbus`, `canopen` or `device`, by which it is known",
-        "hint": "add for example `modbus: 192.0.2.20`, `canopen: rpdo` or `device: island`",
+        "message": "a writer needs the key `modbus`, `canopen`, `device` or `mqtt`, by which it is known",
+        "hint": "add for example `modbus: 192.0.2.20`, `canopen: rpdo`, `device: island` or `mqtt: set`",
     }

@@ -49,10 +49,11 @@ FINGERPRINTS = {
     "full-image.yaml": 0xCB023DE1,
     "io-island.yaml": 0x242D0BB8,
     "rtu-gripper.yaml": 0xFA2B68A8,
-    "mqtt-cell.yaml": 0x78E08C30,
+    "mqtt-cell.yaml": 0x535A928D,
     "robot-program.yaml": 0xB17B003D,
     "secured-cell.yaml": 0xEBFD327A,
     "sparkplug-cell.yaml": 0xC4771DE3,
+    "standby-pair.yaml": 0x9485D3DC,
     "small-cell.yaml": 0xBAD7CD02,
     "two-buses.yaml": 0x7F8C7A72,
     "two-plcs.yaml": 0x22928C89,
@@ -73,7 +74,11 @@ def test_listens_on_loopback_and_says_how_to_change_it(name: str) -> None:
     assert text.startswith("# yaml-language-server: $schema=schema.json\n")
     modbus = plan(name).of(ModbusPlan).get("modbus")
     assert (modbus is None) == (name in {"can-encoder.yaml", "canopen-only.yaml", "rtu-gripper.yaml"})
-    if modbus is not None:
+    if name == "standby-pair.yaml":
+        # No use on one machine, and the virtual address comes after the listener: only the plant's network may connect.
+        assert modbus is not None
+        assert (modbus.host, bool(modbus.allow)) == ("0.0.0.0", True)
+    elif modbus is not None:
         assert modbus.host == "127.0.0.1"
         assert modbus.port > 1023
         assert ("0.0.0.0:502" if modbus.plain else "0.0.0.0:802") in text
@@ -99,6 +104,7 @@ def test_ready_made_files_are_there() -> None:
         "secured-cell.yaml",
         "small-cell.yaml",
         "sparkplug-cell.yaml",
+        "standby-pair.yaml",
         "two-buses.yaml",
         "two-plcs.yaml",
         "ur-native-map.yaml",

@@ -76,7 +76,7 @@ def words(key: str) -> set[str]:
 
 def test_words_are_those_of_the_core() -> None:
     """Reasons that only a bus can cause are none of a test's."""
-    of_a_bus = {"no_such_address", "partial_value", "waited", "not_meant", "contradicted"}
+    of_a_bus = {"no_such_address", "partial_value", "waited", "not_meant", "not_in_role", "contradicted"}
     assert words("refused") | of_a_bus == {reason.name.lower() for reason in Reason}
     qualities = StepSpec.model_fields["quality"].annotation.__args__[0].__args__[1].__args__
     assert set(qualities) == {quality.name.lower() for quality in Quality}

@@ -13,7 +13,7 @@ from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import Direction, Fallback, FallbackKind, Limits, ValueKind
 from gatewayd.links.canopen_node.plan import CanopenPlan, IdentityPlan, ObjectPlan, PdoEntry, PdoPlan
-from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, SecuredPlan, TrustFiles
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
@@ -83,6 +83,7 @@ OF_LINKS: dict[str, Any] = {
     "rpdo_writer": 0,
     "sdo_writer": 0,
     "robot_away": ExceptionCode.BUSY,
+    "tls": SecuredPlan("127.0.0.1", 802, TrustFiles("/own.crt", "/own.key", "/clients.crt", None)),
 }
 KNOWN = {
     "source", "fingerprint", "number", "name", "lock", "low", "high", "members", "kind", "cell", "shown", "shows_nan",

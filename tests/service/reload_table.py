@@ -10,6 +10,11 @@ from typing import Any
 REMOVED = object()
 Changes = Mapping[str, Any]
 ROBOT_PORT, MODBUS_PORT, OTHER_PORT, CHANNEL = "ROBOT_PORT", "MODBUS_PORT", "OTHER_PORT", "CHANNEL"
+TLS_PORT, NEXT_TLS = "TLS_PORT", "NEXT_TLS"
+TRUST = "/TRUST"
+"""Folder with what `make_certificates` makes."""
+SECURED_SECTION = "modbus with TLS"
+"""Its rows need certificates."""
 
 BASE: dict[str, Any] = {
     "gatewayd": 1,
@@ -149,6 +154,30 @@ DASHBOARD = {
     "robot.dashboard": {"port": 1504, "programs": {1: "pick.urp"}, "poll": "1s"},
     "variables.play": {"dashboard": "play", "modbus": {"coil": 40}, "owner": "hmi"},
 }
+# `plc` drives by the listener without TLS, which stays; a client of the other is in tests/links/modbus_server.
+SECURED = {
+    "modbus.tls": {
+        "listen": TLS_PORT,
+        "certificate": f"{TRUST}/ours/gateway.crt",
+        "key": f"{TRUST}/ours/gateway.key",
+        "clients": f"{TRUST}/ours/authority.crt",
+        "roles": {
+            "operator": {"read": "all", "write": "all"},
+            "setter": {"read": ["count"], "write": ["number", "other"]},
+        },
+        "without_role": {"read": ["count"], "write": ["list"]},
+    }
+}
+BY_ROLE = {**SECURED, "writers.hmi.role": "operator"}
+BROKER = {"mqtt": {"host": "127.0.0.9", "topic": "plant/press"}}
+ENCRYPTED = {"mqtt": {**BROKER["mqtt"], "tls": {}}}
+SPARKPLUG = {"mqtt": {"host": "127.0.0.9", "sparkplug": {"group": "plant", "node": "hall-2"}}}
+NAMED = {**BROKER, "variables.level.mqtt": {"name": "height", "deadband": 1, "interval": "2s"}}
+SCADA = {
+    **BROKER,
+    "writers.scada": {"mqtt": "set", "timeout": "20s"},
+    "variables.recipe": {"robot": "input_int_register_9", "owner": "scada", "mqtt": "recipe"},
+}
 
 
 def keys_of(name: str, table: Mapping[str, Any]) -> str:
@@ -239,6 +268,55 @@ ROWS: dict[str, list[Row]] = {
         row("modbus.write_gaps", "ignore"),
         row("modbus.robot_away", "busy"),
         row("modbus.order", "CDAB", "owned"),
+    ],
+    SECURED_SECTION: [
+        Row("modbus.tls", SECURED),
+        row("modbus.tls", REMOVED, given=SECURED),
+        row("modbus.listen", REMOVED, "release", LINE, given=SECURED),
+        row("modbus.tls.listen", NEXT_TLS, given=SECURED),
+        Row(
+            "modbus.tls.certificate modbus.tls.key",
+            {
+                "modbus.tls.certificate": f"{TRUST}/ours/none.crt",
+                "modbus.tls.key": f"{TRUST}/ours/none.key",
+            },
+            given=SECURED,
+        ),
+        row("modbus.tls.clients", f"{TRUST}/other/authority.crt", "weakening", given=SECURED),
+        row("modbus.tls.revoked", f"{TRUST}/ours/revoked.crl", given=SECURED),
+        row(
+            "modbus.tls.revoked",
+            REMOVED,
+            "weakening",
+            given={**SECURED, "modbus.tls.revoked": f"{TRUST}/ours/revoked.crl"},
+        ),
+        Row("modbus.tls.roles", {"modbus.tls.roles.viewer": {"read": "all"}}, "weakening", given=SECURED),
+        Row("modbus.tls.roles", {"modbus.tls.roles.setter": REMOVED}, given=SECURED),
+        Row(
+            "modbus.tls.roles.*.read",
+            {"modbus.tls.roles.setter.read": ["count", "level"]},
+            "weakening",
+            given=SECURED,
+        ),
+        Row("modbus.tls.roles.*.read", {"modbus.tls.roles.setter.read": REMOVED}, given=SECURED),
+        Row("modbus.tls.roles.*.write", {"modbus.tls.roles.setter.write": "all"}, "weakening", given=SECURED),
+        Row("modbus.tls.roles.*.write", {"modbus.tls.roles.setter.write": ["number"]}, given=SECURED),
+        row("modbus.tls.without_role", REMOVED, given=SECURED),
+        row(
+            "modbus.tls.without_role",
+            {"read": "all"},
+            "weakening",
+            given={**SECURED, "modbus.tls.without_role": {}},
+        ),
+        row("modbus.tls.without_role.read", ["count", "level"], "weakening", given=SECURED),
+        row("modbus.tls.without_role.read", REMOVED, given=SECURED),
+        row("modbus.tls.without_role.write", ["list", "bit"], "weakening", given=SECURED),
+        row("modbus.tls.without_role.write", REMOVED, given=SECURED),
+        # Its connection has shown no certificate.
+        row("writers.plc.role", "operator", "release", LINE, given=SECURED),
+        row("writers.hmi.role", "operator", given=SECURED),
+        row("writers.hmi.role", "setter", given=BY_ROLE),
+        row("writers.hmi.role", REMOVED, "weakening", given=BY_ROLE),
     ],
     "canopen": [
         Row("canopen", {"canopen.node": 6}, "release", PLC),
@@ -356,6 +434,61 @@ ROWS: dict[str, list[Row]] = {
             keys_of("variables.*.device", OTHER_OBJECT),
             {"variables.position.device": OTHER_OBJECT},
             given=ENCODER,
+        ),
+    ],
+    # No broker answers, so nobody commands by it: a client and what it loses are in tests/links/mqtt.
+    "mqtt": [
+        # What is owned would be published by another name, or at another pace.
+        Row("mqtt", BROKER, "owned"),
+        row("mqtt", REMOVED, "owned", given=BROKER),
+        row("mqtt.host", "127.0.0.10", given=BROKER),
+        row("mqtt.port", 1884, given=BROKER),
+        row("mqtt.version", 5, given=BROKER),
+        row("mqtt.username", "press", given=BROKER),
+        Row(
+            "mqtt.password_file",
+            {"mqtt.username": "press", "mqtt.password_file": "/no/such/file"},
+            given=BROKER,
+        ),
+        row("mqtt.client", "press", given=BROKER),
+        row("mqtt.keepalive", "20s", given=BROKER),
+        row("mqtt.topic", "plant/stamp", "owned", given=BROKER),
+        row("mqtt.publish", "named", "owned", given=BROKER),
+        row("mqtt.interval", "100ms", "owned", given=BROKER),
+        row("mqtt.every", "none", given=BROKER),
+        row("mqtt.retain", True, given=BROKER),
+        row("mqtt.store", {"keep": "1s", "size": 1}, given=BROKER),
+        row("mqtt.store.keep", "none", given=BROKER),
+        row("mqtt.store.size", 1, given=BROKER),
+        row("mqtt.tls", {}, given=BROKER),
+        row("mqtt.tls", REMOVED, given=ENCRYPTED),
+        row("mqtt.tls.ca", "/no/such/ca.crt", given=ENCRYPTED),
+        Row(
+            "mqtt.tls.certificate mqtt.tls.key",
+            {"mqtt.tls.certificate": "/no/such/press.crt", "mqtt.tls.key": "/no/such/press.key"},
+            given=ENCRYPTED,
+        ),
+        Row("mqtt.sparkplug", SPARKPLUG, "owned", given=BROKER),
+        row("mqtt.sparkplug.group", "works", given=SPARKPLUG),
+        row("mqtt.sparkplug.node", "hall-3", given=SPARKPLUG),
+        row("mqtt.sparkplug.device", "stamp", given=SPARKPLUG),
+        row("mqtt.sparkplug.primary_host", "scada", given=SPARKPLUG),
+        row("variables.number.mqtt", "part", "owned", given=BROKER),
+        row("variables.number.mqtt", "none", "owned", given=BROKER),
+        row("variables.level.mqtt.publish", False, given={**BROKER, "variables.level.mqtt": {}}),
+        row("variables.level.mqtt.name", "level_2", given=NAMED),
+        row("variables.level.mqtt.deadband", 5, given=NAMED),
+        row("variables.level.mqtt.interval", "5s", given=NAMED),
+        Row("writers.*.mqtt", SCADA, given=BROKER),
+        row("writers.scada.mqtt", "command", given=SCADA),
+        row("writers.plc.mqtt", "set", given=BROKER),
+        # It is known by its topic alone then, and its connection is nobody's.
+        Row(
+            "writers.*.mqtt",
+            {"writers.plc": {"mqtt": "set", "timeout": "20s"}},
+            "release",
+            LINE,
+            given=BROKER,
         ),
     ],
     "dashboard": [

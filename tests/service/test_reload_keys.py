@@ -33,17 +33,22 @@ from gatewayd.service.reload import Reloader, Result
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.server import SimulatedController
 from tests.contracts import language
+from tests.links.modbus_server.secured import make_certificates
 from tests.service.reload_table import (
     BASE,
     BOTH,
     CHANNEL,
     LINE,
     MODBUS_PORT,
+    NEXT_TLS,
     OTHER_PORT,
     PLC,
     REMOVED,
     ROBOT_PORT,
     ROWS,
+    SECURED_SECTION,
+    TLS_PORT,
+    TRUST,
     Changes,
     Row,
 )
@@ -69,7 +74,8 @@ class Rig:
     def __init__(self, directory: Path, robot: SimulatedController) -> None:
         self.robot = robot
         self.file = directory / "press.yaml"
-        self.ports = {name: _free_port() for name in (MODBUS_PORT, OTHER_PORT)}
+        self.trust = directory / "trust"
+        self.ports = {name: _free_port() for name in (MODBUS_PORT, OTHER_PORT, TLS_PORT, NEXT_TLS)}
         self.channel = str(uuid4())
         self.write({})
         self.daemon = Daemon(compile_files([str(self.file)]).plans, directory)
@@ -85,7 +91,7 @@ class Rig:
         text = text.replace(f'"{ROBOT_PORT}"', str(self.robot.port))
         for name, port in self.ports.items():
             text = text.replace(name, f"127.0.0.1:{port}")
-        self.file.write_text(text.replace(CHANNEL, self.channel))
+        self.file.write_text(text.replace(CHANNEL, self.channel).replace(TRUST, str(self.trust)))
 
     @property
     def cell(self) -> Cell:
@@ -193,6 +199,8 @@ def _rows() -> Iterable[Row]:
 async def test_a_changed_key(section: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reload_module, "Compilation", CompiledHere)
     wrong = []
+    if section == SECURED_SECTION:
+        make_certificates(tmp_path / "trust")
     async with rigged(tmp_path) as rig:
         for each in ROWS[section]:
             found = await rig.judge(each)

@@ -161,11 +161,26 @@ def test_a_file_that_cannot_be_read_revokes_nobody_and_lets_nobody_change_anythi
     assert credentials.fault == ""
 
 
+def test_an_editor_that_saves_by_renaming_revokes_nobody(
+    credentials: Credentials, file: Path, cell: Cell
+) -> None:
+    now = time.monotonic()
+    cell.operator.take_lock(LOCK, now, holder=ANNA.holder)
+    file.rename(file.with_name("backup"))
+    assert credentials.refresh()
+    write_tokens(file, ANNA)
+    assert credentials.refresh()
+    assert (credentials.fault, credentials.end_what_ended(now, time.time())) == ("", [])
+
+
 def test_a_file_that_is_gone_revokes_everybody(credentials: Credentials, file: Path, cell: Cell) -> None:
     now = time.monotonic()
     cell.operator.take_lock(LOCK, now, holder=ANNA.holder)
     file.unlink()
     assert credentials.refresh()
     assert "gatewayd token create" in credentials.fault
+    assert credentials.end_what_ended(now, time.time()) == [], "an editor may be about to put it back"
+    assert credentials.refresh()
     assert credentials.end_what_ended(now, time.time()) == ["the token anna was revoked"]
+    assert not credentials.refresh()
     assert isinstance(known(credentials, f"Bearer {TOKEN}"), Unidentified)

@@ -69,9 +69,10 @@ DETAIL: Final = "detail"
 _KNOWN: Final = {spelling: column for column, names in _SPELLINGS.items() for spelling in names.split()}
 _OF_OTHERS: Final = frozenset(
     {"cantype", "pdo", "cobid", "pdobit"}
-    | {"device", "devicetype", "devicescale", "deviceoffset", "devicepoll"}
+    | {"device", "devicetype", "devicescale", "deviceoffset", "devicepoll", "devicepdo"}
+    | {"mqttname", "mqttinterval", "mqttdeadband"}
 )
-"""Columns of `gatewayd show` that say more of the CANopen object, and of the place on a device."""
+"""Columns of `gatewayd show` that say more of the CANopen object, of the place on a device, and of MQTT."""
 
 
 def column_of(head: str) -> str:
