@@ -83,7 +83,7 @@ def write_parquet(
 
 
 class _Output(RawIOBase):
-    """A file that takes everything: what the system refuses is kept as a failure, because the library would panic."""
+    """A file that takes everything: what fails, an interrupt too, is kept: the library would make a text of it."""
 
     def __init__(self, file: BinaryIO, failures: list[BaseException]) -> None:
         self._file = file
@@ -93,12 +93,12 @@ class _Output(RawIOBase):
         return True
 
     def write(self, data: Any) -> int:
-        if not self._failures:
-            try:
+        try:
+            if not self._failures:
                 self._file.write(data)
                 self._file.flush()
-            except OSError as error:
-                self._failures.append(error)
+        except BaseException as error:  # noqa: BLE001 - raised again once the library has ended
+            self._failures.append(error)
         return len(data)
 
 

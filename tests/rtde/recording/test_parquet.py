@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.recording import MissingExtraError, RecordingError, open_recording
 from gatewayd.rtde.recording.layout import columns
-from gatewayd.rtde.recording.parquet import write_parquet
+from gatewayd.rtde.recording.parquet import _Output, write_parquet
 from tests.rtde.recording.samples import PACKAGES, RECIPE, packages_of, recipes
 
 
@@ -142,3 +143,16 @@ def test_without_the_library_the_extra_is_named(tmp_path: Path, monkeypatch: pyt
         "A Parquet file needs the package arro3-io, which is not installed: pip install 'gatewayd[parquet]'"
     )
     assert str(error.value) == expected
+
+
+def test_an_interrupt_while_the_file_is_written_stays_one() -> None:
+    """It comes wherever Python runs, and the library would report it as a file that cannot be written."""
+
+    class Interrupted(BytesIO):
+        def write(self, _data: Any) -> int:
+            raise KeyboardInterrupt
+
+    failures: list[BaseException] = []
+    output = _Output(Interrupted(), failures)
+    assert (output.write(b"12"), output.write(b"345")) == (2, 3)
+    assert [type(failure) for failure in failures] == [KeyboardInterrupt]
