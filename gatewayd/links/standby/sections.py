@@ -23,7 +23,7 @@ def _two(peers: tuple[object, ...]) -> tuple[object, ...]:
 
 
 def _virtual(value: object) -> str:
-    hint = "write an IP address without port and prefix, for example 192.168.1.50"
+    hint = "write an IP address without port and prefix, for example 192.0.2.50"
     text = scalar(value, "an IP address", hint)
     try:
         return str(ip_address(text))
@@ -32,7 +32,7 @@ def _virtual(value: object) -> str:
 
 
 _LISTEN_SCHEMA = Annotated[
-    str, Field(pattern=r"^(\[[0-9A-Fa-f:.]+\]|[0-9.]+):[0-9]{1,5}$", examples=["192.168.1.12:2930"])
+    str, Field(pattern=r"^(\[[0-9A-Fa-f:.]+\]|[0-9.]+):[0-9]{1,5}$", examples=["192.0.2.12:2930"])
 ]
 
 
@@ -54,7 +54,7 @@ class Standby(Section):
     )
     address: Annotated[
         str | None,
-        BeforeValidator(_virtual, json_schema_input_type=Annotated[str, Field(examples=["192.168.1.50"])]),
+        BeforeValidator(_virtual, json_schema_input_type=Annotated[str, Field(examples=["192.0.2.50"])]),
     ] = Field(
         default=None,
         description="virtual address that keepalived moves to the gateway that serves the cell; default: none",
