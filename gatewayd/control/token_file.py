@@ -47,7 +47,7 @@ def change_tokens(path: Path, change: Callable[[TokenSet], TokenSet]) -> None:
         except FileNotFoundError:
             present = TokenSet()
         text = as_text(change(present))
-        # Else it would get the group of whoever writes it, and the service could not read it.
+        # Else it would get the group of the user who writes it, and the service could not read it.
         is_new = not path.exists()
         group = (path.parent if is_new else path).stat().st_gid
         with whole_file(path, overwrite=True) as unfinished:

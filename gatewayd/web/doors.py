@@ -1,7 +1,7 @@
 """Connections to the status listener: how many, for how long, from whom, and the TLS handshake in front of HTTP.
 
-A handshake is the most costly thing that a stranger can ask for: a signature. It waits for its turn in the share of the
-loop that all requests have together, so that a flood of them takes from other requests and from no PLC.
+A handshake is the most costly thing that an unknown peer can ask for: a signature. It waits for its turn in the share
+of the loop that all requests have together, so that a flood of them takes from other requests and from no PLC.
 """
 
 from __future__ import annotations

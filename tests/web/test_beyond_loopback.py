@@ -353,7 +353,7 @@ async def test_a_revoked_token_ends_what_it_holds(
 async def test_wrong_tokens_wait_and_the_right_one_never_does(
     session: aiohttp.ClientSession, network: AccessControl
 ) -> None:
-    """From the same address: whoever guesses behind a NAT keeps nobody out."""
+    """From the same address: a client that guesses behind a NAT keeps nobody out."""
     for _ in range(3):
         network.wrong_tokens.wrong("127.0.0.1", time.monotonic())
     begun = time.monotonic()

@@ -11,7 +11,7 @@ from gatewayd.links.modbus_server.trust import FileFacts, TrustError, load, look
 
 _DAY = 86400.0
 SOON = {"certificate": 30 * _DAY, "clients": 30 * _DAY, "revoked": 7 * _DAY}
-"""Seconds before an expiry from which on it is told. Many authorities issue a revocation list each month."""
+"""Seconds before an expiry from which on it is reported. Many authorities issue a revocation list each month."""
 _WHAT = {
     "certificate": ("the gateway's certificate", "clients refuse the gateway", "renew it"),
     "clients": (

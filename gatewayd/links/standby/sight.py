@@ -43,8 +43,8 @@ class Sight:
         """The number to be repeated to the other gateway; 0: none was heard.
 
         The last one that was believed, whatever was named since: else a forged datagram would make the other gateway
-        believe none of ours. One that has started anew knows nobody yet and repeats our number whoever names it, so
-        that its new number is believed next.
+        believe none of ours. One that has started anew knows nobody yet and repeats our number, no matter who names it,
+        so that its new number is believed next.
         """
         return self._heard.number if self._heard is not None else self._named
 

@@ -1,4 +1,4 @@
-"""Files that are read again: good ones are used, bad ones change nothing and are told."""
+"""Files that are read again: good ones are used, bad ones change nothing and are reported."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class Statement:
     why_not: str = ""
 
 
-_PLANT = "whoever names the nodes of a plant has to see to it"
+_PLANT = "it is up to the people who name the nodes of a plant"
 _NO_TEMPLATES = "no templates are published"
 _NO_DATA_SETS = "no data sets are published"
 

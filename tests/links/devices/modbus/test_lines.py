@@ -201,7 +201,7 @@ def test_a_connection_for_each_request_is_no_trouble() -> None:
     [
         (False, True, "0009 0000 0006 07 03 0000 0001", ("one", "two")),
         (True, True, "02 03 0000 0001 0000", ("two",)),
-        # A piece of a serial answer is that of whoever was asked last, whatever it begins with.
+        # A piece of a serial answer is that of the device that was asked last, whatever it begins with.
         (True, False, "01 03 02", ("two",)),
     ],
 )
